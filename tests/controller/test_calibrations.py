@@ -1,4 +1,4 @@
-"""A calibration belongs to the arm it was measured on, and a robot says so where it is another one."""
+"""Calibrations belong to the arm they were measured on; a robot warns if it is another one."""
 
 import msgspec
 import numpy as np
@@ -52,7 +52,7 @@ def shipped():
 
 
 def test_the_shipped_modal_model_matches_the_true_modes_with_any_payload(shipped):
-    """By chance a dozen noisy ring-downs may do worse; this is the file that ships."""
+    """This is the shipped file; another dozen of noisy ring-downs may be worse by chance."""
     rng = np.random.default_rng(2025)
     off = []
     for _ in range(60):
@@ -118,7 +118,7 @@ NAMES = ("auto", "short", "auto-target", "elastic-auto")
 
 
 def ringing(robot: Robot) -> float:
-    """Largest true acceleration of the tool later than 10 ms after the reference has stopped [m/s²]."""
+    """Return the largest true acceleration of the tool later than 10 ms after the reference stops [m/s²]."""
     arm = robot.controller.cycle.plant
     robot.tick(5)
     felt = []

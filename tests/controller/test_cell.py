@@ -1,4 +1,4 @@
-"""A cell follows the robot to the tick: wires, a gripper that answers as a Robotiq 2F, and parts that load the arm."""
+"""A cell follows the robot tick by tick: wires, a Robotiq 2F, and parts that load the arm."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""What changes while the arm moves, what is looked at before it is done, and the limits of every arm."""
+"""Changes during motion, checks before they apply, and the limits of every arm."""
 
 import itertools
 from pathlib import Path
@@ -124,7 +124,7 @@ def test_the_simulated_future_of_the_line_is_bit_equal_to_the_real_one(name):
 
 @pytest.mark.parametrize("shaper", ["none", "zv", "ei3"])
 def test_a_stream_is_stopped_if_its_filtered_end_would_collide(shaper):
-    """With its own low acceleration the stream would come to rest in the floor; a hard stop does not."""
+    """With its own low acceleration the stream would only rest inside the floor; a hard stop does not."""
     robot, start = Robot(), np.array([0.0, -1.6, 0.0, -1.57, 0.0, 0.0])
     robot.send(c.SetShaper, name=shaper)
     robot.send(SimulationReset, q=tuple(start))
@@ -167,7 +167,7 @@ acceleration, of which a shaper makes less where its impulses overlap less.
 
 
 def ratios(robot):
-    """Largest velocity, acceleration and torque of the shaped references over the joints' limits [-]."""
+    """Return the largest velocity, acceleration and torque relative to the limits [-]."""
     arm, q = robot.description, np.array(robot.references)
     torque = np.abs(torques(arm, robot.payload, q)) / arm.limits.torque
     return np.array([*speeds(arm, q), torque.max()])
@@ -179,7 +179,7 @@ def assert_kept(robot, *, torque=True):
 
 
 def moved(arm, shaper, start, goal, payload, limits):
-    """Make a move that is as quick as the arm can, and says what it is slower for; False if it would collide."""
+    """Make the quickest move; return what limits it, or False if it would collide."""
     robot = Subject(arm, np.array(start), payload, shaper=shaper)
     reply = robot.send(c.MoveJ, q=tuple(goal), **limits)
     if refused(reply):
@@ -254,7 +254,7 @@ def test_a_shaper_with_more_overshoot_slows_down_a_guided_motion(kind):
 
 @pytest.mark.parametrize("name", ["ur5e", "ur20"])
 def test_a_move_planned_within_a_tick_keeps_limits_and_names_the_binding_one(name):
-    """It is slowed down by half for a torque, and then a little for a velocity."""
+    """A torque halves its speed first, then a velocity reduces it a little."""
     arm = load(name)
     robot = Subject(arm, np.array(arm.poses["Q1"]), paper_payload(arm), shaper="zv")
     fields = {"velocity": min(arm.limits.velocity), "acceleration": 8.0, "jerk": 500.0}

@@ -1,4 +1,4 @@
-"""Where the arm would meet itself or the floor."""
+"""Collisions of the arm with itself and the floor."""
 
 import itertools
 
@@ -29,7 +29,7 @@ def model():
 
 
 def capsules(q, payload=UR5E.payload):
-    """Ends and radii of all bodies in the world, by forward kinematics of this test's own."""
+    """Return ends and radii of all bodies in the base frame, by the test's own forward kinematics."""
     arm = rigid_model(UR5E, Payload())
     data = arm.createData()
     pin.forwardKinematics(arm, data, q)
@@ -47,14 +47,14 @@ def capsules(q, payload=UR5E.payload):
 
 
 def distance(one, other):
-    """Between two capsules, by brute force along the axis of one."""
+    """Return the distance between two capsules, by brute force along one axis."""
     a, axis = one[0] + np.linspace(0.0, 1.0, 401)[:, None] * (one[1] - one[0]), other[1] - other[0]
     share = np.clip((a - other[0]) @ axis / max(axis @ axis, 1e-12), 0.0, 1.0)
     return np.linalg.norm(a - other[0] - share[:, None] * axis, axis=1).min() - one[2] - other[2]
 
 
 def gaps(q):
-    """Distances of the pairs that can meet, the floor among them."""
+    """Return the distances of all pairs that can meet, including the floor."""
     bodies = capsules(q)
     names = list(bodies)
     apart = {frozenset(pair) for pair in UR5E.collision.apart}
@@ -115,7 +115,7 @@ def turned_wrists(number):
 
 @pytest.mark.parametrize("number", [7, 26, 124, 302, 509])
 def test_a_path_out_of_a_collision_brings_no_pair_of_bodies_closer(model, number):
-    """The nearest pair may move apart while another one, that meets as well, would come nearer."""
+    """The nearest pair may separate while another pair, also too close, would come closer."""
     start = turned_wrists(number)
     assert model.meeting(start) is not None
     way = JointLine(start, start + np.random.default_rng([number, 1]).uniform(-0.5, 0.5, 6)).whole

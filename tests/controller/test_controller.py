@@ -23,7 +23,7 @@ DISC = paper_payload(UR5E)
 
 
 def moving(robot: Robot, ticks: int = 200) -> int:
-    """Id of a motion that has been under way for some ticks."""
+    """Start a move and let it run for some ticks; return its number."""
     accepted = robot.send(c.MoveJ, q=Q3_)
     robot.tick(ticks)
     return accepted.id

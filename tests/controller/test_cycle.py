@@ -1,4 +1,4 @@
-"""The control line as a whole: Figure 6."""
+"""The whole control line (Figure 6)."""
 
 import re
 from pathlib import Path
@@ -24,7 +24,7 @@ from .robots import FITTING, PAPER, Q1, Q3, UR5E, H, Robot, cut, without_arm
 
 
 def motion(line, target, limits=PAPER):
-    """Shaped reference at every tick of a motion, and for a while after; ticks until it was said to rest."""
+    """Return the shaped reference of a motion and after, and the ticks until rest."""
     line.begin(line.plan(np.array(target), limits))
     shaped, rested = [], None
     for tick in range(6000):
@@ -40,7 +40,7 @@ def motion(line, target, limits=PAPER):
 @pytest.mark.parametrize("name", FITTING)
 @pytest.mark.parametrize("target", [Q3, Q1 + 1e-3])
 def test_the_line_is_at_rest_soon_after_the_last_movement(name, target):
-    """A target is the shaped reference of a tick before, so that tick is two after the last that moved.
+    """The target is one tick behind the shaped reference, so rest is two ticks after the last movement.
 
     Up to two more where a small last impulse makes steps below 1e-7 rad that come to more than that together.
     """
@@ -53,7 +53,7 @@ def test_the_line_is_at_rest_soon_after_the_last_movement(name, target):
 
 @pytest.mark.parametrize("name", ["zv", "zvd", "ei3"])
 def test_a_plateau_between_two_impulses_does_not_count_as_rest(name):
-    """A jog of 0.1 mrad lasts 32 ms, the shaper 75 ms and more: in between the shaped reference stands still."""
+    """A jog of 0.1 mrad lasts 32 ms, the shaper 75 ms: the shaped reference stands in between."""
     line = without_arm(name, estimator=Fixed([6.7], [0.1]))
     shaped, rested = motion(line, Q1 + 1e-4)
     steps = np.abs(np.diff(shaped, axis=0)).max(axis=1)
@@ -84,7 +84,7 @@ FIELDS = ("q", "qd", "qdd")
 
 
 def unshaped(state):
-    """Position, velocity and acceleration before shaping; what is null is that of the target."""
+    """Return position, velocity and acceleration before shaping, by default those of the target."""
     return [
         own if (own := getattr(state, f"unshaped_{name}")) is not None else getattr(state, f"target_{name}")
         for name in FIELDS
@@ -169,7 +169,7 @@ def tensor(values):
 
 
 def bodies(description, payload):
-    """Number of the link, mass, centre of mass and inertia of everything that moves."""
+    """Return link number, mass, centre of mass and inertia of all moving bodies."""
     links = description.links
     yield from zip(range(1, description.joints + 1), links.mass, links.com, links.inertia, strict=True)
     yield description.joints, payload.mass, payload.com, payload.inertia
@@ -226,7 +226,7 @@ def command_of(controllers, target, torque, gravity):
 
 
 def commanded(description, *targets):
-    """Last of several drive commands, with torque and gravity as inverse dynamics gives them."""
+    """Return the last of several drive commands, with torques of inverse dynamics."""
     dynamics = InverseDynamics(description, body(paper_payload(description)))
     controllers = DriveFeedForward(description)
     for target in targets:

@@ -40,13 +40,13 @@ def stage(description=UR5E, **how) -> ElasticFeedForward:
 
 
 def planned(shaper, description=UR5E, calibration=MODAL, *, q=Q1, mass=None):
-    """A filter by name, as a server makes it."""
+    """Return a filter by name, as a server makes it."""
     setup = Setup(description, tuple(q), paper_payload(description, mass), calibration, shaper=shaper)
     return FilterPlanner(setup).first()
 
 
 def line(shaper: str, q=Q1, *, mass=None, description=UR5E, calibration=MODAL, plant=None) -> Line:
-    """A control line with such a filter."""
+    """Return a control line with such a filter."""
     chosen = planned(shaper, description, calibration, q=q, mass=mass)
     payload = body(paper_payload(description, mass))
     return Line(
@@ -56,7 +56,7 @@ def line(shaper: str, q=Q1, *, mass=None, description=UR5E, calibration=MODAL, p
 
 
 def moves(cycle: Line, target, limits=PAPER):
-    """Make a motion, and yield its samples with 0.6 s of rest."""
+    """Make a motion; yield its samples and those of 0.6 s of rest."""
     cycle.begin(quickest_motion(JointLine(cycle.sample.reference, np.array(target)), limits))
     cycle.tvist.aim(np.array(target))
     rest = 0
@@ -66,7 +66,7 @@ def moves(cycle: Line, target, limits=PAPER):
 
 
 def ringing(cycle, target):
-    """Largest true acceleration of the tool later than 10 ms after the motion's end [m/s²]."""
+    """Return the tool's largest true acceleration later than 10 ms after the motion's end [m/s²]."""
     force = np.array([cycle.plant.truth().specific_force for _ in moves(cycle, target)])
     return np.linalg.norm(force - force[-1], axis=1)[-295:].max()
 
@@ -110,7 +110,7 @@ def test_elastic_feed_forward_ignores_springs_and_gains_of_the_robot_file():
 
 
 def followed(wanted, room):
-    """Follow a course of one joint; return the leads, and whether any acceleration was limited."""
+    """Follow the values of one joint; return the leads, and whether acceleration was limited."""
     led, window, out, limited = np.full((3, 1), wanted[0]), np.full((3, 1), wanted[0]), [], False
     for value in wanted:
         window[1:] = window[:-1].copy()
@@ -223,7 +223,7 @@ def test_a_lead_beyond_the_torque_limit_is_limited_and_reported():
 
 
 def watched_commands(robot):
-    """Commands that the drives get from now on."""
+    """Return the list of drive commands from now on."""
     commands, step = [], robot.controller.cycle.plant.step
 
     def watched(command):
@@ -255,7 +255,7 @@ LARGEST = Imperfections.of(STICKS).stiction[0]
 
 
 def rigid(description: RobotDescription) -> RobotDescription:
-    """The arm with gears and links a hundred times as stiff, whose drives hold their motors on the commands."""
+    """Return the arm a hundred times as stiff, whose motors follow their commands."""
     replace, drives, links = msgspec.structs.replace, description.drives, description.link_flexibility
     stiff = replace(
         drives,
@@ -275,7 +275,7 @@ def rigid(description: RobotDescription) -> RobotDescription:
 
 @pytest.mark.parametrize("limits", [PAPER, MotionLimits(0.05, 0.2, 10.0)], ids=["paper", "creeping"])
 def test_fed_forward_stiction_equals_the_stiction_of_the_plant(limits, measured):
-    """There and back, so that every motor turns round while it is held."""
+    """The arm moves to and fro, so that every motor reverses while it sticks."""
     description = rigid(STICKS)
     plant = FlexibleArm(description, description.payload, substeps=16)
     cycle = line("auto", description=description, calibration=STICKING, plant=plant)

@@ -1,4 +1,4 @@
-"""Force at the tool, force mode, freedrive and contacts: what gives way, what stays, and what ends it."""
+"""Force at the tool, force mode, freedrive and contacts: compliant and stiff axes, and how each ends."""
 
 import numpy as np
 import pinocchio as pin
@@ -70,7 +70,7 @@ def test_zeroing_subtracts_an_offset_in_the_sensor_frame():
 
 
 def test_in_free_air_the_tool_moves_along_the_wanted_force_only():
-    """As ROS 2's test of its controller: +10 N, damping 0.1, gain 0.8; more than 3 cm in 5 s, others below 1 mm."""
+    """As in ROS 2's test: +10 N, damping 0.1, gain 0.8; over 3 cm in 5 s, other axes below 1 mm."""
     robot, _ = touching(0.0)
     assert force_mode(robot, wrench=(0.0, 0.0, 10.0, 0.0, 0.0, 0.0), damping=0.1, gain=0.8) == Accepted(id=1)
     begun = np.array(robot.tick(1).actual_TCP_pose)
@@ -86,7 +86,7 @@ def test_in_free_air_the_tool_moves_along_the_wanted_force_only():
     ("stiffness", "sensor", "gain", "settled"), [(1e4, False, 1.0, 250), (1e5, True, 2.0, 500)]
 )
 def test_a_surface_is_pressed_with_the_wanted_force_without_bouncing(stiffness, sensor, gain, settled):
-    """Twice the usual gain is the largest that may be asked for."""
+    """The largest permitted gain is twice the usual one."""
     robot, plant = touching(stiffness, sensor=sensor)
     force_mode(robot, wrench=(0.0, 0.0, -20.0, 0.0, 0.0, 0.0), gain=gain)
     forces = pressed(robot, plant, 200 + settled)
@@ -187,7 +187,7 @@ def test_freedrive_follows_a_hand_along_free_axes_only():
 
 
 def test_freedrive_does_not_pass_a_singular_posture():
-    """It gets slower, says so, and keeps its limits."""
+    """It slows down, reports this, and keeps its limits."""
     robot, plant = feeling()
     start(robot, "freedrive_mode()", "while True:", "write_output_integer_register(0, get_freedrive_status())",
           "sync()", "end")  # fmt: skip
@@ -241,7 +241,7 @@ def test_arcs_in_force_mode_and_moves_in_freedrive_are_refused():
 
 @pytest.mark.parametrize(("stiffness", "sensor"), [(1e5, True), (1e4, False), (0.0, False)])
 def test_tool_contact_finds_the_start_of_a_contact(stiffness, sensor):
-    """As the scripts of UR's clients do: move until tool_contact says so, then back to where it began."""
+    """As scripts of UR's clients do: move until tool_contact reports one, then back to its start."""
     robot, plant = touching(stiffness, gap=0.02, sensor=sensor)
     finished(
         robot, plant, "s = 0", "i = 0", "while s == 0 and i < 800:", "s = tool_contact([0, 0, -1, 0, 0, 0])",

@@ -1,4 +1,4 @@
-"""What keeps force control safe: sensors that fall silent or change, stops, other tools, heavy payloads, threads."""
+"""Safety of force control: silent or changed sensors, stops, other tools, heavy payloads, threads."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,7 @@ def sense(robot, wrench=SEVEN, **fields):
 
 
 def sensed(robot, ticks, wrench=SEVEN):
-    """Tick while a force sensor tells the same again and again."""
+    """Tick while a force sensor repeats its value."""
     for _ in range(ticks):
         sense(robot, wrench)
         robot.tick()
@@ -183,7 +183,7 @@ KEEP = ("thread keep():", "while True:", DOWN, "sync()", "end", "end", "t = run 
 
 
 def test_force_mode_of_one_thread_applies_to_moves_of_another():
-    """As PolyScope writes it: a thread calls force_mode in every step, and moves begin at once."""
+    """As PolyScope exports it: one thread calls force_mode in every step, while moves run in another."""
     robot, plant = touching(1e4)
     start(robot, "here = get_target_tcp_pose()", *KEEP,
           "movel(pose_trans(p[0.01,0,0,0,0,0], here), a=.5, v=.05, r=.002)", "sleep(.1)",
@@ -215,7 +215,7 @@ def test_payload_inertia_is_not_taken_for_a_force():
 
 
 def test_late_set_points_are_not_taken_for_a_contact():
-    """As over a network: four times a second twelve ticks bring none, and the next one makes up for them."""
+    """As over a network: four times a second twelve ticks bring none, and the next one catches up."""
     robot, _ = touching(0.0, mass=3.0)
     start(robot, "thread watch():", "s = 0", "while True:", "s = s + tool_contact(get_actual_tcp_speed())",
           "write_output_integer_register(0, s)", "sync()", "end", "end", "t = run watch()",

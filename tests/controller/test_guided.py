@@ -1,4 +1,4 @@
-"""Guided motions: servo_j, speed_j and speed_l, what they do, and how they begin and end."""
+"""Guided motions servo_j, speed_j and speed_l: their start, course and end."""
 
 import numpy as np
 import pytest
@@ -168,13 +168,13 @@ def poses(arm, tcp=(0.0,) * 6):
 
 
 def off_line(pose, xd):
-    """Distances of the tool from a line from its start in this direction."""
+    """Return the tool's distances from a line from its start in this direction."""
     way, direction = pose[:, :3] - pose[0, :3], np.array(xd) / np.linalg.norm(xd)
     return np.abs(way - np.outer(way @ direction, direction)).max(axis=1)
 
 
 def ending(arm):
-    """The event of the first motion that was stopped."""
+    """Return the event of the first stopped motion."""
     return next(event for event in arm.events if event.kind == "motion_stopped")
 
 

@@ -1,4 +1,4 @@
-"""What a hostile program can make a tick compute is bounded, by counts, and what has stopped does nothing any more."""
+"""Hostile programs compute little per tick, and stopped ones have no further effects."""
 
 import re
 import resource
@@ -29,7 +29,7 @@ MOST = max(EVALUATIONS, MOST_OPERATIONS) + OVERDRAFT
 
 
 class Counts:
-    """Calls of a function in each tick."""
+    """Counts the calls of a function in each tick."""
 
     def __init__(self, monkeypatch, owner, name):
         self.of_tick, whole = 0, getattr(owner, name)
@@ -60,7 +60,7 @@ def spending(monkeypatch):
 
 @pytest.mark.parametrize("seed", [*range(4), 12, 93, 156])
 def test_no_tick_exceeds_the_evaluation_budget_with_hostile_programs(seed, monkeypatch):
-    """All programs of the robot together; a statement that a tick began late is borne by the next one."""
+    """All programs of a robot share the budget; the next tick pays for a statement that began late."""
     robot, beside, _ = begin(seed)
     spent = spending(monkeypatch)
     solved = Counts(monkeypatch, type(robot.controller.programs.arm._access.motion.cycle.dynamics), "inertia")
@@ -78,7 +78,7 @@ def test_no_tick_exceeds_the_evaluation_budget_with_hostile_programs(seed, monke
 
 @pytest.mark.parametrize("seed", [6, 81, 240, 490])
 def test_hostile_programs_cause_few_plans_and_stops(seed, monkeypatch):
-    """Threads that are killed while they move, and short moves in quick succession, are held back."""
+    """Threads killed while they move, and short moves in quick succession, are delayed."""
     robot, beside, _ = begin(seed)
     plans, stops = Counts(monkeypatch, Planner, "plan"), Counts(monkeypatch, Stopper, "plan_stop")
     ticks, dear = 600, 0
@@ -95,7 +95,7 @@ ENDS = ("halt", "protective_stop()", "x = 1 / 0")
 
 
 def stopping(seed):
-    """A random program that writes, moves and has threads, one of which ends or stops it at a random moment."""
+    """Return a random program with threads, one of which ends or stops it at a random moment."""
     random = np.random.default_rng(seed)
     head, body = Author(UR5E, np.array(URSIM), random).program("prog").split("\n", 1)
     end = ("thread t():", f"sleep({random.uniform(0.0, 0.3):.3f})", random.choice(ENDS), "end", "run t()")
@@ -112,7 +112,7 @@ def stopping(seed):
 
 
 def written(robot):
-    """What programs have written."""
+    """Return everything that programs have written."""
     places = robot.controller.peripherals
     numbers = [places.read("output_int", place) for place in range(4)]
     return places.digital_outputs, numbers, places.read("output_double", 1), list(places.analog_shares)
@@ -120,14 +120,14 @@ def written(robot):
 
 @pytest.mark.parametrize("seed", range(20))
 def test_ended_or_stopped_programs_have_no_further_effects(seed):
-    """Not even in the same tick: after a stop no output, register or message changes, and no motion begins."""
+    """After a stop no output, register or message changes, and no motion starts in its tick."""
     robot = a_robot()
     player = robot.controller.programs
     robot.send(ProgramRun, text=stopping(seed))
     at_stop, hear, known = [], player.hear, 0
 
     def watching(event):
-        """Look at what was written when the program stops, still within the tick."""
+        """Record what was written when the program stops, still within the tick."""
         hear(event)
         if event.kind in {"program_stopped", "protective_stop"} and not at_stop:
             at_stop.append((len(robot.controller.events), written(robot)))
@@ -148,7 +148,7 @@ def test_ended_or_stopped_programs_have_no_further_effects(seed):
 
 @pytest.fixture
 def little_memory():
-    """Let what takes more than a gigabyte fail."""
+    """Let allocations above a gigabyte fail."""
     used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     before = resource.getrlimit(resource.RLIMIT_AS)
     resource.setrlimit(resource.RLIMIT_AS, (used + (1 << 30), before[1]))
@@ -159,7 +159,7 @@ def little_memory():
 @pytest.mark.timeout(7200)
 @pytest.mark.parametrize("seeds", [range(40), pytest.param(range(40, 3000), marks=pytest.mark.nightly)])
 def test_random_programs_with_odd_numbers_raise_no_exception(seeds, little_memory, monkeypatch):
-    """Nothing is raised out of a tick, or by a function that does not blame its arguments."""
+    """No tick raises, and no function fails without blaming its arguments."""
     spent = spending(monkeypatch)
     for seed in seeds:
         robot = a_robot()
@@ -175,7 +175,7 @@ def test_random_programs_with_odd_numbers_raise_no_exception(seeds, little_memor
 
 
 class Heard(Kept):
-    """What a robot says."""
+    """Keeps output and errors."""
 
     def __init__(self):
         super().__init__()
@@ -327,7 +327,7 @@ def text(seed: int) -> tuple[list[str], tuple[float, ...]]:
 
 
 class Beside:
-    """Plans what programs order, between the ticks, as a served robot does next to them."""
+    """Plans orders of programs between the ticks, as a served robot does in parallel."""
 
     def __init__(self, robot) -> None:
         self.controller = robot.controller
@@ -346,7 +346,7 @@ class Beside:
 
 
 def begin(seed: int):
-    """Return a robot that runs the hostile program of a seed, and what plans for it."""
+    """Return a robot that runs the hostile program of a seed, and its planner."""
     texts, q = text(seed)
     robot = a_robot(q=q)
     beside = Beside(robot)
@@ -371,7 +371,7 @@ SETTINGS = (
 
 
 def odd(seed: int) -> str:
-    """A program that sets the robot up and moves it, with odd numbers among plausible ones."""
+    """Return a program that sets the robot up and moves it, with odd numbers among plausible ones."""
     r = Random(seed)
     share = r.choice((0.02, 0.1, 0.3))
     lines = [r.choice((r.choice(SETTINGS), r.choice(HOSTILE_MOVES))) for _ in range(r.randrange(1, 7))]

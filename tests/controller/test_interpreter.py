@@ -29,7 +29,7 @@ def state(robot):
 
 
 def said_at_rest(robot):
-    """What was said when the arm has come to rest, and the next statement has had its turn."""
+    """Return the texts written when the arm rests and the next statement has had its turn."""
     robot.until_rest()
     robot.tick(3)
     return said(robot)
@@ -152,7 +152,7 @@ def test_statements_sent_too_early_are_dropped_with_a_warning():
 
 
 def test_a_move_can_be_skipped_before_it_starts():
-    """A line is planned for some ticks after it was called."""
+    """A line is planned for some ticks after the call."""
     robot = waiting()
     before = robot.states[-1].reference_q
     add(robot, f"movel({NEAR}, a=1, v=0.3)", 2)

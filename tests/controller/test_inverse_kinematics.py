@@ -32,7 +32,7 @@ RIGHT = np.pi / 2
 
 
 def arm(a, d, alpha, limit=2 * np.pi):
-    """A description with these parameters."""
+    """Return a description with these parameters."""
     joints = len(a)
     base = UR5E if joints == 6 else chain(joints)
     base = changed(base, "kinematics", a=tuple(a), d=tuple(d), alpha=tuple(alpha))
@@ -40,7 +40,7 @@ def arm(a, d, alpha, limit=2 * np.pi):
 
 
 def random_ur(rng):
-    """An arm with parallel axes 2, 3, 4 and lengths of any sign, some of them zero."""
+    """Return an arm with parallel axes 2, 3, 4 and lengths of any sign, some of them zero."""
     a, d = rng.uniform(-0.5, 0.5, (2, 6))
     a[[1, 2]] += np.sign(a[[1, 2]]) * 0.1
     a[4] = 0.0
@@ -53,7 +53,7 @@ def random_ur(rng):
 
 
 def random_spherical(rng):
-    """An arm with a spherical wrist and lengths of any sign, some of them zero."""
+    """Return an arm with a spherical wrist and lengths of any sign, some of them zero."""
     a, d = rng.uniform(-0.5, 0.5, (2, 6))
     a[1] += np.sign(a[1]) * 0.1
     d[3] += np.sign(d[3]) * 0.1
@@ -83,7 +83,7 @@ def pose_of(description, q):
 
 
 def error(description, pose, q):
-    """Largest error of position [m] and rotation [rad], by the textbook's products."""
+    """Return the largest error of position [m] and rotation [rad], by textbook products."""
     found = forward_kinematics(description, q)
     return max(np.linalg.norm(found[:3, 3] - pose[1]), np.linalg.norm(found[:3, :3] - pose[0]) / np.sqrt(2))
 
@@ -93,7 +93,7 @@ def wrapped(difference):
 
 
 def improved(table, links, pose, near):
-    """What `all_postures` finds, each improved as far as its error is not rounding; rows without one begin with NaN."""
+    """Return the postures of `all_postures`, each refined to rounding; rows without one begin with NaN."""
     found = np.empty((8, 6))
     inverse.all_postures(table, links, *pose, near, found)
     for row in range(8):
@@ -106,7 +106,7 @@ def improved(table, links, pose, near):
 
 
 def every(description, pose):
-    """The distinct postures that have a pose, whatever the ranges; those next to zero of a curve of them."""
+    """Return the distinct postures of a pose in any range; of a curve, those next to zero."""
     table, links, zero = arm_table(description), Arm(description).chain, np.zeros(description.joints)
     table[:-1, 4] = 2 * np.pi
     if table[-1, 0] != ANY:
@@ -123,7 +123,7 @@ def every(description, pose):
 
 
 def nearest(postures, near, limit):
-    """The smallest distance, of all postures and all their representations in the range."""
+    """Return the smallest distance over all postures and their representations in range."""
     least = np.inf
     for posture in postures:
         total = 0.0
@@ -154,7 +154,7 @@ FREE = {
 
 
 def missed(description, pose, rng, starts=64):
-    """Postures that a numerical search finds and the closed form does not have."""
+    """Return postures that a numerical search finds and the closed form lacks."""
     links, known = Arm(description).chain, every(description, pose)
     for start in rng.uniform(-np.pi, np.pi, (starts, description.joints)):
         q = start.copy()
@@ -216,7 +216,7 @@ def test_arms_without_closed_form_are_solved_numerically(description):
 @pytest.mark.parametrize("place", [(0.0, 0.0, 0.3), (0.05, 0.0, 0.5), (3.0, 0.0, 0.0), (np.nan, 0.0, 0.0)])
 @pytest.mark.parametrize("description", [UR5E, PUMA, chain(6), cut(4)], ids=["ur", "puma", "chain", "short"])
 def test_an_unreachable_pose_has_no_solution(description, place):
-    """The first two are beside the UR's axis 1, nearer than the shoulder's offset."""
+    """The first two are closer to the UR's axis 1 than the shoulder's offset."""
     if description in (PUMA, chain(6)) and np.linalg.norm(place) < 1.0:
         place = (0.0, 2.0, 0.0)
     flange = np.array(place) + np.array([0.0, 0.0, UR5E.kinematics.d[5]])
@@ -339,7 +339,7 @@ def test_a_rotation_vector_converts_back_to_its_rotation(angle):
 
 
 def by_numpy(J, torque):
-    """Damped least squares as the documentation says."""
+    """Return damped least squares as documented."""
     tall = J.shape[1] <= J.shape[0]
     square = J.T @ J if tall else J @ J.T
     manipulability = np.sqrt(max(np.linalg.det(square), 0.0))

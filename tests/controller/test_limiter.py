@@ -1,4 +1,4 @@
-"""The limiter: inside the limits, and exact again afterwards."""
+"""The limiter keeps limits, and is exact again afterwards."""
 
 import numpy as np
 import pytest
@@ -17,13 +17,12 @@ from .streams import assert_within
 
 
 def at_rest(q, limits, reach=np.inf, torque=None):
-    """A limiter that starts at rest."""
     still = np.zeros_like(q)
     return Limiter((q, still, still), limits, np.broadcast_to(reach, q.shape), torque)
 
 
 def followed(limiter: Limiter, points) -> np.ndarray:
-    """What comes out for a walk from rest; with each point goes the slope of the parabola through the last three."""
+    """Return the output for a walk from rest, with slopes of parabolas through three points."""
     out, before, last = [limiter.q], limiter.q, limiter.q
     for point in points:
         rise, fall = point - last, last - before
@@ -73,7 +72,7 @@ def test_the_limiter_keeps_limits_and_catches_up_with_random_walks(seed, joints,
     ],
 )
 def test_the_limiter_passes_a_moving_signal_unchanged_after_catching_up(motion, jump):
-    """The closer, the slower: as fast as the signal could still brake, so that it is not overshot."""
+    """It approaches no faster than the signal could still brake, so that it does not overshoot."""
     time = np.arange(2500) * H
     walk = np.stack([motion(time) + jump * (time > 1.0), 0.1 * motion(time)], axis=1)
     limiter = at_rest(walk[0], PAPER)
@@ -91,7 +90,7 @@ def test_the_limiter_passes_a_moving_signal_unchanged_after_catching_up(motion, 
 
 
 class Narrow:
-    """Torque that permits an acceleration, of the number of states asked for."""
+    """Torque that permits an acceleration, by number of queried states."""
 
     def __init__(self, limit):
         self.limit, self.asked = limit, 0
@@ -107,7 +106,7 @@ class Narrow:
 @examples(10)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_a_falling_torque_limit_is_kept_within_the_jerk_limit(seed):
-    """Acceleration is taken back at the jerk limit; until then it is beyond by what the limit fell."""
+    """Acceleration decreases at the jerk limit; until then it exceeds the limit by its fall."""
     random = np.random.default_rng(seed)
     swing = random.uniform(0.02, 0.1, 3)
     time = np.arange(1500) * H
@@ -125,7 +124,7 @@ def test_a_falling_torque_limit_is_kept_within_the_jerk_limit(seed):
 
 @pytest.mark.parametrize("speed", [0.3, 1.0, 2.5])
 def test_a_joint_with_little_torque_stops_inside_its_range(speed):
-    """Its stop is judged by the acceleration that the torque permits, which is what it stops with."""
+    """Its stop uses the acceleration that torque permits."""
     reach, weak = 2.0, Narrow(lambda _: 4.0)
     limiter = at_rest(np.zeros(2), MotionLimits(3.0, 40.0, 2000.0), reach=np.full(2, reach), torque=weak)
     ramp = np.minimum(speed * H * np.arange(4000), reach)
@@ -138,7 +137,7 @@ angles = st.floats(-6.28, 6.28)
 
 
 def played(motion: PlannedMotion, start) -> np.ndarray:
-    """All references, the start first and the target for some ticks at the end."""
+    """Return all references: the start first, and the target for some ticks at the end."""
     points = [start]
     while not motion.finished:
         points.append(motion.next())
@@ -153,7 +152,7 @@ def played(motion: PlannedMotion, start) -> np.ndarray:
     jerk=st.floats(10.0, 2000.0),
 )
 def test_planned_motions_keep_limits_by_differences_and_end_exactly(ends, velocity, acceleration, jerk):
-    """Differences over a tick are means over it, and so within the limits; the last tick is cut at the target.
+    """Differences over a tick are means over it and so within limits; the last tick ends at the target.
 
     Rounding of ε = 2e-16 in 2π is worth 2ε·2π/h in velocity, 4ε·2π/h² in acceleration, 8ε·2π/h³ in jerk; that
     of ruckig's own polynomials is some ten times more.
@@ -174,7 +173,7 @@ TOLERANCE = 1.002
 
 
 def with_speeds(speeds, limits=PAPER, most=20_000):
-    """A motion from Q1 to Q3 with the speed given at each tick; positions, and rates after each tick."""
+    """Move from Q1 to Q3 with the speed given for each tick; return positions and rates after each tick."""
     motion = quickest_motion(JointLine(Q1, Q3), limits)
     q, rates = [Q1, Q1], []
     for tick in range(most):

@@ -1,4 +1,4 @@
-"""Programs of many points close to each other: the arm does not stand still, and what comes late it waits for."""
+"""Paths of many close points: the arm does not stop in between, and waits for late points."""
 
 import numpy as np
 import pytest
@@ -19,14 +19,14 @@ APART, ROUND, SPEED, ACCELERATION = 1.5e-3, 0.05, 0.5, 2.0
 
 
 def circle(count):
-    """Points on a circle through where the arm is, shape (count, 3) [m]."""
+    """Return points on a circle through the present position, shape (count, 3) [m]."""
     angles = 2.0 * np.arcsin(0.5 * APART / ROUND) * np.arange(1, count + 1)
     around = np.column_stack((np.sin(angles), 1.0 - np.cos(angles), np.zeros(count)))
     return np.array(HERE[:3]) + ROUND * around
 
 
 def zigzag(count):
-    """Rows of 30 mm, 6 mm apart."""
+    """Return rows of 30 mm, 6 mm apart."""
     steps = ([[1, 0, 0]] * 20 + [[0, 1, 0]] * 4 + [[-1, 0, 0]] * 20 + [[0, 1, 0]] * 4) * (count // 48 + 1)
     return np.array(HERE[:3]) + APART * np.cumsum(steps[:count], axis=0)
 
@@ -40,19 +40,19 @@ def moves(points, radius=5e-4):
 
 
 def tool(robot):
-    """Positions of the tool, of the shaped reference, one a tick [m]."""
+    """Return positions of the tool at the shaped reference, one per tick [m]."""
     return np.array([KINEMATICS.pose(np.array(state.target_q))[1] for state in robot.states])
 
 
 def speeds(robot):
-    """Speed of the tool between the first and the last moment at which it moves, without 0.1 s at both ends [m/s]."""
+    """Return the tool's speed while it moves, without 0.1 s at both ends [m/s]."""
     speed = np.linalg.norm(np.diff(tool(robot), axis=0), axis=1) / H
     moving = np.flatnonzero(speed > 1e-6)
     return speed[moving[0] : moving[-1] + 1][50:-50]
 
 
 def away(robot, points):
-    """Largest distance of the tool from the lines between the points [m]."""
+    """Return the tool's largest distance from the lines between the points [m]."""
     corners, worst = np.vstack((HERE[:3], points)), 0.0
     starts, ways = corners[:-1], np.diff(corners, axis=0)
     for place in tool(robot):
@@ -74,7 +74,7 @@ def begin(points, ticks=0, **changes):
 
 @pytest.mark.parametrize("shaper", ["none", "zv"])
 def test_dense_points_are_followed_quickly_without_stops(shaper):
-    """Without its ends, which last longer with a shaper, it takes at most 1.25 times the circle's quickest time."""
+    """Without its ends, it takes at most 1.25 times the circle's quickest time."""
     points = circle(200)
     robot = finish(begin(points, shaper=shaper))
     between = speeds(robot)
@@ -155,7 +155,7 @@ def test_a_path_resumes_after_a_protective_stop_without_going_back():
 
 
 def test_a_stop_before_tight_corners_is_quick_and_stays_on_the_path():
-    """The motion slows down for its corners by itself, so no one limit suits the way to the end of a stop."""
+    """The motion slows down for its corners, so no single limit suits the whole stop."""
     points, ticks = zigzag(150), 295
     robot = begin(points, ticks, shaper="zv")
     robot.controller.motion.protect("a test")

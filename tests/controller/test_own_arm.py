@@ -1,4 +1,4 @@
-"""An arm that stands somewhere, has power, brakes and faults of its own, or a controller of its own."""
+"""A real arm: a given position, power, brakes and faults, or a controller of its own."""
 
 from dataclasses import replace
 
@@ -26,7 +26,7 @@ TARGET = tuple(np.add(STANDS, [0.3, -0.2, 0.2, 0.0, 0.1, 0.0]).tolist())
 
 
 def ready():
-    """A robot that has switched its arm on."""
+    """Return a robot whose arm is switched on."""
     plant = OwnArm(UR5E, UR5E.payload)
     robot = Robot(plant=plant)
     robot.tick(SWITCHES + 1)
@@ -54,7 +54,7 @@ def restart(robot):
 
 
 def moves(robot):
-    """It can move again, and arrives."""
+    """Check that the arm can move and arrives."""
     assert isinstance(robot.send(c.MoveJ, q=TARGET), Accepted)
     assert robot.until_rest().actual_q == pytest.approx(TARGET, abs=5e-4)
 
@@ -192,7 +192,7 @@ def test_an_arm_without_reset_cannot_be_placed():
 
 
 class Cut(OwnArm):
-    """An arm whose cable may be cut: each method then raises what no method of a plant should."""
+    """An arm with a cable that may be cut: its methods then raise exceptions that plants should not raise."""
 
     cut = ()
 
@@ -206,7 +206,7 @@ class Cut(OwnArm):
 
 
 def cut_off():
-    """A robot whose arm is switched on, and the arm."""
+    """Return such an arm, switched on, and its robot."""
     arms = []
     plant = OwnPlant("cut.py:Cut", "", lambda *given: arms.append(Cut(*given)) or arms[0])
     robot = Robot(plant=plant.make(UR5E, UR5E.payload))
@@ -252,7 +252,7 @@ PUSH = {"fault": "torque", "joint": 1, "value": 40.0, "seconds": 0.1}
 
 
 def test_a_given_flexible_arm_equals_the_default_plant():
-    """Whatever it carried before: the setup says what it carries."""
+    """The setup determines the payload, whatever the plant carried before."""
     given = FlexibleArm(UR5E, Payload())
     robots = Robot(seed=3), Robot(seed=3, plant=given)
     for robot in robots:
@@ -267,7 +267,7 @@ def test_a_given_flexible_arm_equals_the_default_plant():
 
 @pytest.mark.parametrize("plant", [NoArm(), type("Own", (NoArm, Plant), {"payload": Payload()})()])
 def test_a_user_plant_follows_the_reference(plant):
-    """Where it is told to be: the reference, led by what the flexible arm's gears would twist."""
+    """It follows the reference plus the lead for the twist of the flexible arm's gears."""
     robot = Robot(plant=plant)
     robot.send(c.MoveJ, q=tuple(Q2.tolist()))
     assert robot.until_rest().actual_q == pytest.approx(Q2, abs=1e-6)
@@ -368,7 +368,6 @@ def robot(arm):
 
 
 def let_move(robot, arm):
-    """Let it move, for a while."""
     robot.send(c.MoveJ, q=[Q2[0] + 0.5, *Q2[1:]], velocity=0.5, acceleration=1.0, jerk=20.0)
     robot.tick(200)
     assert np.abs(arm.q - np.array(Q2)).max() > 0.01

@@ -1,4 +1,4 @@
-"""Motions in space: lines, arcs and blends where an independent computation has them, shaped as unshaped."""
+"""Lines, arcs and blends match an independent computation, shaped and unshaped."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ from .robots import H
 
 
 def went(robot: Subject, kind, **fields) -> np.ndarray:
-    """The tool's positions in a motion, one for each tick, shape (k, 3)."""
+    """Return the tool's positions in a motion, one per tick, shape (k, 3)."""
     reply = robot.send(kind, **fields)
     assert isinstance(reply, Accepted), reply
     begun_at = len(robot.references) - 1
@@ -140,7 +140,7 @@ def test_a_path_out_of_joint_range_is_refused_with_joint_and_progress():
 
 
 def two_parts(shaper: str = "zv"):
-    """A robot that moves along a path that stops at its corner, and is about to come to rest there."""
+    """Return a robot on a path that stops at its corner, just before it rests there."""
     robot = begun(shaper=shaper)
     robot.send(
         MovePath, segments=tuple(LineSegment(pose=away(to)) for to in ((0.1, 0.0, 0.0), (0.1, 0.1, 0.0)))

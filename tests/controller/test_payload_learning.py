@@ -1,4 +1,4 @@
-"""Motions are recorded whole, and what is learnt is journaled and can be undone."""
+"""Motions are recorded completely, and lessons are journaled and can be undone."""
 
 from dataclasses import replace
 from functools import partial
@@ -53,7 +53,7 @@ class Recalling:
 
 
 class Served:
-    """A robot that a client moves, tick by tick."""
+    """A robot moved by a client, tick by tick."""
 
     def __init__(self, student=None, shaper="elastic", **changes):
         setup = free_setup(None, shaper=shaper)
@@ -111,8 +111,6 @@ def test_interrupted_motions_are_recorded_as_such(what):
 
 
 class Failing:
-    """Fails at each motion in the same way."""
-
     def study(self, motion):  # noqa: ARG002
         raise OSError(28, "No space left on device")
 
@@ -132,7 +130,7 @@ def taken_for(payload):
 
 
 class Following(Served):
-    """A robot that follows its payload."""
+    """A robot that learns its payload."""
 
     def __init__(self, declared, carried, student=None, **changes):
         changes = {"adapt": "payload", "calibration": MODAL} | changes
@@ -150,7 +148,7 @@ class Following(Served):
 
 @pytest.fixture(scope="module")
 def deceived():
-    """A robot that has moved 4 kg, of which 1 kg is declared, and what studied its motion."""
+    """A robot that has moved 4 kg, of which 1 kg is declared, and the student of its motion."""
     student = Recalling()
     robot = Following(1.0, 4.0, student, adapt=None)
     robot.move(Q2)
@@ -268,7 +266,7 @@ def disc(mass):
 
 
 def random_poses(rng, count):
-    """Free ones, all over the workspace and with the wrists free."""
+    """Return collision-free postures all over the workspace."""
     model, found = CollisionModel(ROBOT, disc(5.0)), []
     while len(found) < count:
         q = rng.uniform([-np.pi, -np.pi, -2.6, -np.pi, -3, -3], [np.pi, 0, 2.6, 0, 3, 3])
@@ -278,7 +276,7 @@ def random_poses(rng, count):
 
 
 class Watched:
-    """A cycle and a monitor that looks on."""
+    """A control line and a payload monitor."""
 
     def __init__(self, q, declared, carried, description=ROBOT, seed=0):
         tvist = TvistFilter(shaper("zv"), Fixed([8.0], [0.2]), joints=6)
@@ -294,7 +292,7 @@ class Watched:
         return None if said is None else said.why
 
     def move(self, q, limits=LIMITS):
-        """Warnings of a motion, of which the next begins at once."""
+        """Return the warnings of a motion; the next one begins at once."""
         self.cycle.begin(self.cycle.plan(q, limits))
         said = []
         while not self.cycle.mode.at_rest:

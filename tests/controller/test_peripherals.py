@@ -1,4 +1,4 @@
-"""Inputs, outputs, registers and the tool centre point: what is set is told, and nothing else changes."""
+"""Inputs, outputs, registers and tool centre point: settings are published, and nothing else changes."""
 
 import numpy as np
 import pinocchio as pin

@@ -1,4 +1,4 @@
-"""Programs as PolyScope and others write them: the set-up before the program, what is not simulated, run states."""
+"""Programs as PolyScope exports them: set-up, functions that are not simulated, run states."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Programs: the controller carries them out by itself, line by line, with the authority of whoever played them."""
+"""The controller carries out programs by itself, with the rights of the client that played them."""
 
 import pytest
 
@@ -43,12 +43,12 @@ def stopped(robot):
 
 
 def moves(robot):
-    """Beginnings and ends of motions."""
+    """Return starts and ends of motions."""
     return [event.kind for event in robot.events if event.kind.startswith("motion_")]
 
 
 def reached(robot):
-    """Where motions ended, by their targets."""
+    """Return the targets of completed motions."""
     ends = {event.tick for event in robot.events if event.kind == "motion_done"}
     return [pytest.approx(state.target_q, abs=1e-6) for state in robot.states if state.tick in ends]
 

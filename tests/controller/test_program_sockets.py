@@ -1,4 +1,4 @@
-"""Sockets of programs: nothing that arrives is lost, and a time-out needs robot time and wall time."""
+"""Sockets of programs lose no data, and time-outs need robot time and wall time."""
 
 from struct import pack
 
@@ -15,7 +15,7 @@ OPENS = 'socket_open("10.0.0.2", 50001)'
 
 
 class Far:
-    """The other end of a program's sockets: `tell` brings news before the next tick, `take` all orders so far."""
+    """The other end of a program's sockets: `tell` brings news, `take` collects orders."""
 
     def __init__(self, robot):
         self._sockets, self.orders = robot.controller.programs.sockets, []
@@ -36,13 +36,13 @@ class Far:
         return b"".join(order.data for order in self.of(Send))
 
     def expire(self):
-        """Let the wall time of the waits pass that ask for it."""
+        """Let the wall time of the waits that ask for it pass."""
         for order in self.of(Expire):
             self.tell("expired", number=order.wait)
 
 
 def opened(*lines):
-    """A robot whose program has an open socket, and goes on with these lines."""
+    """Return a robot whose program has an open socket and continues with these lines."""
     robot = a_robot()
     far = Far(robot)
     start(robot, OPENS, *lines)
@@ -302,7 +302,7 @@ def test_socket_orders_are_consistent_for_random_programs(calls, beside, steps):
 
 
 def left_open(orders):
-    """Sockets and waits that orders leave behind, which fit each other."""
+    """Return the sockets and waits that remain after consistent orders."""
     live, waits = set(), set()
     for order in orders:
         match order:

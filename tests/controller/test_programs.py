@@ -1,4 +1,4 @@
-"""Programs in URScript move the arm, read and write what clients see, and end as UR's controllers end them."""
+"""Programs in URScript move the arm, read and write what clients see, and end as on UR's controllers."""
 
 from itertools import pairwise
 
@@ -24,28 +24,28 @@ NEAR = [angle + 0.2 for angle in URSIM]
 
 
 def ended(robot):
-    """Why each program has ended, None for those that ended by themselves."""
+    """Return why each program has ended, None for those that ended by themselves."""
     return [event.why for event in robot.events if event.kind == "program_stopped"]
 
 
 def told(robot):
-    """Ticks in which programs wrote a text."""
+    """Return the ticks in which programs wrote a text."""
     return [event.tick for event in robot.events if event.kind == "text"]
 
 
 def pose(dx=0.0, dy=0.0, dz=0.0):
-    """A pose beside the one at the start, as text."""
+    """Return a pose near the start, as text."""
     x, y, z, *turn = HERE
     return f"p{[x + dx, y + dy, z + dz, *turn]}"
 
 
 def place(dx, dy, dz):
-    """A place beside the one at the start [m]."""
+    """Return a position near the start [m]."""
     return np.array([HERE[0] + dx, HERE[1] + dy, HERE[2] + dz])
 
 
 def places(robot):
-    """Positions of the tool before shaping, one a tick [m]."""
+    """Return the tool's positions before shaping, one per tick [m]."""
     return np.array([KINEMATICS.pose(np.array(state.reference_q))[1] for state in robot.states])
 
 
@@ -428,7 +428,7 @@ LINE = f"movel({pose(dy=0.1)}, a=1.0, v=0.2)"
 
 @pytest.mark.parametrize("ticks", [1, 5, 9])
 def test_a_client_may_move_the_arm_while_a_line_is_planned(ticks):
-    """The program stops that motion first, as it does with one that goes on when a move is called."""
+    """The program stops the client's motion first, as it does if one continues when a move is called."""
     robot = a_robot()
     start(robot, LINE, "textmsg(1)")
     robot.tick(ticks)
@@ -462,7 +462,7 @@ def test_a_resumed_servoc_can_be_paused_again():
 
 @pytest.mark.parametrize("move", [f"movej({NEAR})", LINE, "speedj([0.1, 0, 0, 0, 0, 0], 1, 0.2)", "sync()"])
 def test_protective_stop_pauses_the_program_at_the_next_waiting_statement(move):
-    """Also at a move in the same tick, which is carried out when the program is played again."""
+    """Also at a move in the same tick, which is carried out after the program is played again."""
     robot = a_robot()
     start(robot, "protective_stop()", move, "textmsg(1)")
     robot.tick(20)
@@ -499,7 +499,7 @@ BUSY = "thread guide():", "  while True:", "    speedj([0.2, 0, 0, 0, 0, 0], 4, 
 
 
 def guiding(work):
-    """A robot whose program guides the arm by a thread that works for a while after each of its commands."""
+    """Return a robot guided by a thread that computes for a while after each command."""
     robot = a_robot()
     text = script(*BUSY, "handle = run guide()", "while True:", "  sync()", "end").format(work)
     robot.send(ProgramRun, text=text)

@@ -1,4 +1,4 @@
-"""What is refused: each command's content once, through the door that clients use, by code, field and limit."""
+"""Refused commands: the content of each, once, as clients send them; code, field and limit."""
 
 import math
 
@@ -41,7 +41,7 @@ def moving(robot):
 
 
 def assert_unchanged(robot: Robot, twin: Robot, ticks: int = 50) -> None:
-    """The next states and events are, bit for bit, those of one that did not get the command."""
+    """Check that the next states and events equal, bit for bit, those of a robot without the command."""
     for each in (robot, twin):
         each.states.clear()
         each.events.clear()
@@ -58,7 +58,7 @@ def encoded_io(robot):
 
 
 def alike(begin, **changes):
-    """A robot and its twin, both of which do the same."""
+    """Return a robot and its twin, which do the same."""
     robots = [Robot(**changes) for _ in range(2)]
     for each in robots:
         begin(each)
@@ -74,7 +74,7 @@ def polynomial(calibration):
 
 
 def deep(change):
-    """A calibration with a fault deep inside."""
+    """Return a calibration with a fault deep inside."""
     found = content()
     return polynomial(found | {"polynomial": found["polynomial"] | change})
 
@@ -90,27 +90,22 @@ def path(*segments):
 COEFFICIENTS = POLYNOMIAL["f_d_coefficients"]
 TOO_MANY = Registers(bank="input_double", first=47, values=(1.0, 2.0))
 NO_BIT = Registers(bank="input_bit", values=(2,))
+INT, MOST = {"bank": "input_int"}, UR5E.limits
 FIXED = {"name": "fixed", "f_d": (8.0,), "zeta": (0.2,)}
 WRONG = [  # command, content, code and field; the limit told, or words that help
     (c.TakeControl, {"client": "b"}, "no_control", "token"),
     (c.TakeControl, {"client": "a", "protocol": 2}, "unsupported_version", "protocol"),
     (c.MoveJ, {"q": Q2_[:5]}, "out_of_range", "q", 6),
     (c.MoveJ, {"q": (*Q2_, 0.0)}, "out_of_range", "q"),
-    (c.MoveJ, {"q": (7.0, *Q2_[1:])}, "limit_position", "q[0]", UR5E.limits.position[0]),
+    (c.MoveJ, {"q": (7.0, *Q2_[1:])}, "limit_position", "q[0]", MOST.position[0]),
     (c.MoveJ, {"q": (*Q2_[:5], -math.inf)}, "limit_position", "q[5]"),
     (c.MoveJ, {"q": (*Q2_[:5], NAN)}, "limit_position", "q[5]"),
-    (c.MoveJ, {"q": Q2_, "velocity": 4.0}, "limit_velocity", "velocity", UR5E.limits.velocity[0]),
+    (c.MoveJ, {"q": Q2_, "velocity": 4.0}, "limit_velocity", "velocity", MOST.velocity[0]),
     (c.MoveJ, {"q": Q2_, "velocity": 1e-4}, "out_of_range", "velocity"),
     (c.MoveJ, {"q": (6.28, *Q2_[1:]), "velocity": 5e-324}, "out_of_range", "velocity"),
-    (
-        c.MoveJ,
-        {"q": Q2_, "acceleration": 41.0},
-        "limit_acceleration",
-        "acceleration",
-        UR5E.limits.acceleration[0],
-    ),
+    (c.MoveJ, {"q": Q2_, "acceleration": 41.0}, "limit_acceleration", "acceleration", MOST.acceleration[0]),
     (c.MoveJ, {"q": Q2_, "acceleration": 5e-324}, "out_of_range", "acceleration"),
-    (c.MoveJ, {"q": Q2_, "jerk": 3000.0}, "out_of_range", "jerk", UR5E.limits.jerk[0]),
+    (c.MoveJ, {"q": Q2_, "jerk": 3000.0}, "out_of_range", "jerk", MOST.jerk[0]),
     (c.MoveJ, {"q": Q2_, "jerk": 1e-300}, "out_of_range", "jerk"),
     (c.ServoStart, {"velocity": 4.0}, "limit_velocity", "velocity"),
     (c.ServoStart, {"acceleration": 1e-9}, "out_of_range", "acceleration"),
@@ -148,25 +143,15 @@ WRONG = [  # command, content, code and field; the limit told, or words that hel
     (c.SetPayload, BODY | {"inertia": (0.01, 0.02, 0.0, 0.01, 0.0, 0.01)}, "out_of_range", "inertia"),
     (c.SetPayload, BODY | {"inertia": (0.01, 0.0, 0.0, 0.01, 0.0, 0.03)}, "out_of_range", "inertia"),
     (c.SetPayload, BODY | {"inertia": IMPOSSIBLE}, "out_of_range", "inertia"),
-    (SetRegisters, {"bank": "input_int", "first": 47, "values": (1, 2)}, "out_of_range", "values"),
+    (SetRegisters, INT | {"first": 47, "values": (1, 2)}, "out_of_range", "values"),
     (SetRegisters, {"bank": "input_bit", "first": 100, "values": (True,) * 29}, "out_of_range", "values"),
-    (SetRegisters, {"bank": "input_int", "values": (1, 1.5)}, "out_of_range", "values[1]"),
-    (SetRegisters, {"bank": "input_int", "values": (2**31,)}, "out_of_range", "values[0]"),
-    (SetRegisters, {"bank": "input_int", "values": (True,)}, "out_of_range", "values[0]"),
+    (SetRegisters, INT | {"values": (1, 1.5)}, "out_of_range", "values[1]"),
+    (SetRegisters, INT | {"values": (2**31,)}, "out_of_range", "values[0]"),
+    (SetRegisters, INT | {"values": (True,)}, "out_of_range", "values[0]"),
     (SetRegisters, {"bank": "input_bit", "values": (True, 1)}, "out_of_range", "values[1]"),
     (SetRegisters, {"bank": "input_double", "values": (False,)}, "out_of_range", "values[0]"),
-    (
-        SetRegisters,
-        {"bank": "input_int", "values": (8,), "also": (TOO_MANY,)},
-        "out_of_range",
-        "also[0].values",
-    ),
-    (
-        SetRegisters,
-        {"bank": "input_int", "values": (8,), "also": (NO_BIT,)},
-        "out_of_range",
-        "also[0].values[0]",
-    ),
+    (SetRegisters, INT | {"values": (8,), "also": (TOO_MANY,)}, "out_of_range", "also[0].values"),
+    (SetRegisters, INT | {"values": (8,), "also": (NO_BIT,)}, "out_of_range", "also[0].values[0]"),
     (SetRegisters, {"bank": "output_double", "values": (1.5,), "token": None}, "missing_field", "token"),
     (SimulationReset, {"q": Q2_[:2]}, "out_of_range", "q"),
     (SimulationReset, {"q": Q2_, "shaper": "zvv"}, "unknown_shaper", "shaper"),
@@ -212,7 +197,7 @@ def assert_refused(robot, twin, table):
 
 @pytest.mark.parametrize("begin", [Robot.tick, moving, Robot.stream])
 def test_invalid_commands_are_refused_and_change_nothing(begin):
-    """Before it is looked at what the arm does."""
+    """Content is checked before the present activity."""
     assert_refused(*alike(begin), WRONG)
 
 

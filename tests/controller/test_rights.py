@@ -1,4 +1,4 @@
-"""What is admitted, and that nothing else is even read."""
+"""Admission of commands, and that nothing else is decoded."""
 
 import math
 
@@ -118,7 +118,7 @@ SILENCE = round(TIMEOUT / H) + 1
 
 @pytest.fixture
 def streaming():
-    """A host in real time whose client streams, and its sink."""
+    """Return a host in real time with a streaming client, and its sink."""
     sink = Kept()
     host = Host(Controller(setup(clock="realtime")), sink)
     host.request(encode(c.TakeControl(client="a")))
@@ -165,7 +165,7 @@ def test_set_points_of_other_clients_are_not_reported_at_the_end_of_a_stream(str
 
 @pytest.mark.parametrize("fault", [{}, {"q": (math.nan, *Q1[1:])}])
 def test_a_set_point_needs_control_when_it_is_carried_out(streaming, fault):
-    """A set-point may wait long after its admission: then it is none of the client's that has control meanwhile."""
+    """A set-point may wait long after admission, and another client may have control by then."""
     host, sink = streaming
     token = host.controller.session.lease.token
     waiting = admit_setpoint(

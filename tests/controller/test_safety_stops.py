@@ -1,4 +1,4 @@
-"""Stops of UR's categories 0, 1 and 2, and what the safety system keeps."""
+"""Stops of UR's categories 0, 1 and 2, and states that the safety system keeps."""
 
 import numpy as np
 import pytest
@@ -129,7 +129,7 @@ def test_safety_modes_have_their_rtde_bits():
 
 @pytest.mark.parametrize("seed", range(4))
 def test_brakes_slow_every_joint_monotonically_to_rest(seed):
-    """Joints never speed up by the brakes themselves, each stays once it rests, and all rest in the end."""
+    """Brakes never speed a joint up, a joint that rests stays at rest, and all rest in the end."""
     random = np.random.default_rng(seed)
     state = Target(random.uniform(-3, 3, 6), random.uniform(-3, 3, 6), np.zeros(6))
     way = brake(UR5E, body(paper_payload(UR5E, float(random.uniform(0, 5)))), state)

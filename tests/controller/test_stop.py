@@ -1,4 +1,4 @@
-"""Stops: their trajectories, and in mid-motion at random moments."""
+"""Stops: their trajectories, at random moments of a motion."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ from .robots import PAPER, Q1, Q2, Q3, UR5E, H, Robot, stop, without_arm
 
 
 def run(line, ticks):
-    """Published targets of some ticks."""
+    """Return the published targets of some ticks."""
     samples = [line.step() for _ in range(ticks)]
     return np.array([[s.target.q, s.target.qd, s.target.qdd] for s in samples])
 
@@ -29,7 +29,7 @@ def until_rest(line):
 
 
 def test_a_stop_is_no_later_and_no_further_than_the_move():
-    """Where no rung of decelerations keeps the torque, the move itself is the stop."""
+    """If no deceleration on the ladder keeps the torque limits, the move itself is the stop."""
     robot = Robot()
     robot.send(SimulationReset, q=(0.0, -1.57, 0.0, -1.57, 0.0, 0.0))
     limits = {"velocity": 3.14, "acceleration": 4.0, "jerk": 2000.0}
@@ -83,7 +83,7 @@ def test_only_a_harder_stop_replaces_a_gentle_one():
 
 @pytest.mark.parametrize(("name", "way"), [("um_zv", 0.003), ("um_zv", 0.6), ("um_zvd", 0.05)])
 def test_with_negative_impulses_a_motion_is_done_after_all_echoes(name, way):
-    """Their echoes cancel for a moment: a shaped reference that stands may go on."""
+    """Echoes cancel for a moment: a shaped reference that stands still may move again."""
     robot = Robot()
     robot.send(c.SetEstimator, name="fixed", f_d=(5.0,), zeta=(0.05,))
     robot.send(c.SetShaper, name=name)
@@ -99,7 +99,7 @@ LIMITS = UR5E.limits
 
 
 def plan(q, qd, qdd, wanted=None, *, payload=DISC, description=UR5E, clear=lambda _: True):
-    """The stop of every joint by itself, as a stream is stopped."""
+    """Return the stop of independent joints, as for a stream."""
     state = Target(*(np.array(values, dtype=float) for values in (q, qd, qdd)))
     planner = StopPlanner(description, InverseDynamics(description, payload))
     return planner.by_joints(state, wanted, clear)
@@ -112,7 +112,7 @@ def moving(seed):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_a_stop_uses_the_hardest_deceleration_within_torque_limits(seed):
-    """Each is asked for itself: what a hard stop does not keep a gentler one may not, either."""
+    """Each deceleration is checked by itself: a gentler stop may fail where a harder one does."""
     state = Target(*map(np.array, moving(seed)))
     stop = plan(*state.__reduce__()[1])
     torque = StopTorque(InverseDynamics(UR5E, DISC), state, np.array(LIMITS.torque))
@@ -137,7 +137,7 @@ def test_a_colliding_stop_is_replaced_by_a_clear_one():
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_stop_causes_no_torque_overload(seed):
-    """The flexible arm swings beyond what is asked of it, but never for more than 10 ms beyond its drives' limits."""
+    """The flexible arm overshoots the demand, but never exceeds its drives' limits for more than 10 ms."""
     random = np.random.default_rng(seed)
     robot = Robot(seed=seed)
     if seed % 2:

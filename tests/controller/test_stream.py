@@ -26,7 +26,7 @@ SLOW = 0.008
 
 
 def regular(function, count, *, every=1, first=0):
-    """A set-point at every so many ticks, made of the time of its number."""
+    """Return a set-point every few ticks, computed from its time."""
     return {first + every * k: [(k, function((every * H) * k))] for k in range(count)}
 
 
@@ -35,7 +35,7 @@ def start(period=H, limits=PAPER, q=(0.0,)):
 
 
 def gentle(time, amplitude=0.2, omega=2.0):
-    """Begins like t⁴ and goes on with at most 2 A ω² = 1.6 rad/s² and 3 A ω³ = 4.8 rad/s³."""
+    """Return a motion that begins like t⁴, with at most 2 A ω² = 1.6 rad/s² and 3 A ω³ = 4.8 rad/s³."""
     return 0.5 * amplitude * (1.0 - np.cos(omega * time)) ** 2
 
 
@@ -76,7 +76,7 @@ def test_a_leap_of_the_sequence_number_keeps_limits(leap, period):
 
 
 def test_the_delay_adapts_to_late_set_points_and_back():
-    """It is made up of the parabola through those before it, and counted; a set-point a tick late finds its place."""
+    """Missing points are extrapolated and counted; a point one tick late is used."""
     arrivals = regular(gentle, 1500)
     for late in range(200, 501, 30):
         arrivals[late + 1] = [*arrivals[late + 1], *arrivals.pop(late)]
@@ -143,7 +143,7 @@ def test_a_silent_stream_rests_soon_even_with_a_low_jerk_limit(jerk):
 
 
 def delay(period):
-    """B-spline and spare, two periods and one, of a stream that is in time; a tick less, as it is known at once."""
+    """Return a timely stream's delay: three periods (B-spline and spare), less a tick."""
     return 3 * period - H
 
 
@@ -153,7 +153,7 @@ def delayed(ticks, function, period=SLOW):
 
 @pytest.mark.parametrize("period", [0.003, 0.004, SLOW, 0.02, 0.05])
 def test_slower_streams_are_delayed_by_three_periods(period):
-    """The B-spline runs at q̈ T²/6 beside the set-points."""
+    """The B-spline deviates from the set-points by q̈ T²/6."""
     stream = start(period)
     out = played(stream, network(lambda t: gentle(t)[:, None], period, 4.0), 2000)[:, 0]
     # Where the period is no whole number of ticks, some set-points are seen a part of a tick late.
@@ -166,7 +166,7 @@ def test_slower_streams_are_delayed_by_three_periods(period):
 
 @pytest.mark.parametrize("period", [0.004, SLOW, 0.02, 0.05])
 def test_a_stream_at_its_limits_passes_without_limitation(period):
-    """Made by the double-S at the very limits of the stream: second and third differences are means of theirs."""
+    """The double-S is at the limits: its differences are means of its derivatives."""
     motion = there_and_back(PAPER)
     stream = start(period, q=motion(np.zeros(1))[0])
     out = played(stream, network(motion, period, 5.0), 2500)
@@ -178,7 +178,7 @@ def test_a_stream_at_its_limits_passes_without_limitation(period):
 @pytest.mark.parametrize("pause", [0.1, 0.2, 0.8])
 @pytest.mark.parametrize("period", [H, SLOW])
 def test_a_stream_continues_after_a_pause_of_its_sender(period, pause):
-    """It comes to rest inside the limits, and nothing that comes afterwards is lost."""
+    """It rests within the limits, and no later set-point is lost."""
     every, gap = round(period / H), round(pause / H)
     count = round(0.8 / period)
     arrivals = regular(gentle, count, every=every)
@@ -201,7 +201,7 @@ MOST = np.array(UR5E.limits.torque)
 @pytest.mark.parametrize("frequency", [1.5, 3.0])
 @pytest.mark.parametrize("start", [Q1, Q3])
 def test_a_shaped_stream_keeps_its_torque_share(start, frequency):
-    """Two per thousand for what lies between a reference and its shaped one."""
+    """Two per thousand are for the difference between a reference and its shaped one."""
     line = without_arm(q=start)
     stream = line.stream(H, MotionLimits(3.0, 40.0, 2000.0))
     motion = swinging([0.05, 0.1, 0.1, 0.1, 0.1, 0.1], frequency, 0.4)
@@ -238,7 +238,7 @@ def follow(motion, period, limits=PAPER, **network_):
 
 
 def from_clean(out, clean):
-    """Largest distance from a clean stream that is played out as late, whatever that is [rad]."""
+    """Return the largest distance from a clean stream, whatever its lag [rad]."""
     ticks = np.arange(len(out))
     columns = list(zip(out.T, clean.T, strict=True))
     return min(
@@ -261,7 +261,7 @@ def test_jitter_and_loss_at_125_hz_change_the_stream_by_under_two_mrad(name):
 @pytest.mark.parametrize("clock", [-0.005, 0.005])
 @pytest.mark.parametrize("period", [H, 0.008, 0.02])
 def test_a_sender_clock_off_by_half_a_percent_is_followed(period, clock):
-    """The delay goes with it, smoothly: at 500 Hz most of a slow one are made up, of those a tick before."""
+    """The delay follows smoothly; at 500 Hz most points of a slow clock are extrapolated."""
     motion = MOTIONS["sine"]
     stream, out = follow(motion, period, clock=clock, jitter=0.3)
     assert_within(out)
@@ -313,7 +313,7 @@ MODULES = (clearance, differentiator, limiter, line_limits, stream)
 
 @pytest.fixture
 def in_python(monkeypatch):
-    """Calls a function with all kernels replaced by their Python source."""
+    """Return a function that calls another one with all kernels replaced by their Python source."""
 
     def call(function):
         with monkeypatch.context() as patched:

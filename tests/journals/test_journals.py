@@ -20,10 +20,7 @@ from tvist_protocol.stream import Truth
 
 FOLDER = Path(__file__).parent
 RUNS = sorted(FOLDER.glob("*.mcap"))
-QUICK = (
-    "speeds", "tool_paths", "elastic_with_a_payload", "force_mode_in_contact", "cell_with_a_gripper", "live_stream",
-    "live_lost_lease",
-)  # fmt: skip
+QUICK = ("speeds", "tool_paths", "elastic_with_a_payload", "cell_with_a_gripper", "live_lost_lease")
 """Runs that are short, and different in what moves the arm."""
 OTHERS = [path.stem for path in RUNS if path.stem not in QUICK]
 POSITION = 1e-6
@@ -78,7 +75,7 @@ def test_recorded_runs_are_reproduced(name):
 
 @pytest.mark.nightly
 def test_generic_kernels_give_the_same_bits(tmp_path):
-    """As in the wheels of `tvist-compiled`; all that is not compiled is the same."""
+    """As in the wheels of `tvist-compiled`; everything that is not compiled is the same."""
     any_processor = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "", "NUMBA_CACHE_DIR": str(tmp_path)}
     run = [sys.executable, "-c", DIGEST, *map(str, RUNS)]
     here, there = (
@@ -104,7 +101,7 @@ def compare(recorded, again, names, touched):
 
 
 def rounding(name, touched):
-    """By how much a value may differ, as a share of one more than it."""
+    """Return by how much a value may differ, relative to one more than its size."""
     if AS_MADE or touched:
         return 0.0 if AS_MADE else TOUCHED
     return next((most for end, most in ROUNDING.items() if name.endswith(end)), POSITION)
