@@ -84,7 +84,7 @@ def _stop(name: str) -> tuple[Floats, Floats, Floats]:
     cycle = ControlCycle(
         description, tvist, elastic=elastic, q=start, declared=carried, carried=carried, seed=0
     )
-    motion = quickest_motion(JointLine(start, end), LIMITS, PERIOD)
+    motion = quickest_motion(JointLine(start, end), LIMITS)
     stop = round(motion.duration / PERIOD)
     cycle.begin(motion)
     force, left = [], []
@@ -112,7 +112,7 @@ def mean_delay_figure() -> Figure:
         estimator = modal_estimator(calibration, description, payload, BUILT_IN.modes_of(name, MODES))
         tvist = BUILT_IN.make_filter(name, estimator, joints=description.joints)
         tvist.reset(start)
-        motion = quickest_motion(JointLine(start, end), LIMITS, PERIOD)
+        motion = quickest_motion(JointLine(start, end), LIMITS)
         rows: list[tuple[float, float]] = []
         while not motion.finished or len(rows) < motion.duration / PERIOD + TICKS_AFTER:
             q = tvist.filter(motion.next())

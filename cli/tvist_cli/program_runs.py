@@ -12,7 +12,7 @@ from tvist_cli.compiling import compile_if_new
 from tvist_cli.failure import Failure, Misuse, failing_on, interrupted
 from tvist_cli.output import err, print_json, say
 from tvist_cli.serving import introduction, say_recorded, say_who_can_reach
-from tvist_controller.programs.checking import ProgramFinding, check_program
+from tvist_controller.programs.compiling import ProgramFinding, check_program
 from tvist_lab.programs.judging import Run, broken, changes, missed
 from tvist_lab.programs.limits import RunLimits
 from tvist_lab.programs.results import Shortcoming, as_dict, summary

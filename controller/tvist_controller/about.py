@@ -8,8 +8,8 @@ import numpy as np
 
 from tvist_controller.controller import Controller
 from tvist_controller.foresight.stops import StopPlanner
+from tvist_controller.kinematics.arm import InverseDynamics
 from tvist_controller.line.differentiator import Floats, Target
-from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.setup import body, paper_payload
 from tvist_controller.sources.calibrations import available, fits
 from tvist_plant.description import RobotDescription
@@ -120,7 +120,7 @@ def _found(described: bytes) -> tuple[Stopping, ...]:
     description, rows = msgspec.json.decode(described, type=RobotDescription), []
     for mass in (0.0, description.limits.payload):
         dynamics = InverseDynamics(description, body(paper_payload(description, mass)))
-        planner = StopPlanner(description, dynamics, PERIOD)
+        planner = StopPlanner(description, dynamics)
         q = _stretched(description, dynamics)
         for speed in SPEEDS:
             found = [

@@ -11,10 +11,10 @@ from tvist_controller.dispatch.rights import NoControlError, is_holders
 from tvist_controller.dispatch.robot import RobotParts
 from tvist_controller.dispatch.table import COMMANDS, HARMLESS
 from tvist_controller.instruments.report import TRUE_MODES_EVERY, Report, true_modes, truth_message
-from tvist_controller.line.sample import Sample
+from tvist_controller.line.line_tick import Sample
 from tvist_controller.motion.setpoints import Unreadable
 from tvist_controller.planning.plan import CommandCall, Order, Plan
-from tvist_controller.refusal import RefusalError
+from tvist_controller.refusal import RefusalError, wrong_mode
 from tvist_controller.safety.own_controller import REFUSED
 from tvist_controller.setup import Setup
 from tvist_plant.foreign import arm_of
@@ -89,7 +89,7 @@ class Controller(RobotParts):
     ) -> Reply | None:
         """Carry out a command; return None for the reply `Done`; raise RefusalError or NoControlError."""
         if self.watching is not None and type(command) not in HARMLESS:
-            raise RefusalError("wrong_mode", "", REFUSED)
+            raise wrong_mode(REFUSED)
         if self.supervision is not None:
             self.supervision.check(command)
         if not isinstance(command, SimulationStep):  # a step changes nothing before its ticks

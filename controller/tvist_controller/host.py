@@ -13,7 +13,7 @@ from tvist_controller.instruments.report import Sink
 from tvist_controller.motion.setpoints import Unreadable
 from tvist_controller.planning.plan import Plan
 from tvist_controller.programs.sockets import SocketNews, SocketPorts
-from tvist_controller.safety.experience import Experience
+from tvist_controller.safety.payload_learning import PayloadLearning
 from tvist_plant.foreign import told
 from tvist_plant.user_file import named
 from tvist_protocol.codec import encode
@@ -36,7 +36,7 @@ class Host:
         controller: The robot.
         sinks: Sinks of its output, in this order.
         ports: Network for sockets of programs; None for no network.
-        experience: What the robot learns from its motions; None for nothing.
+        learning: What the robot learns from its motions; None for nothing.
         survives: Whether an exception causes a protective stop and goes to the sinks instead of the caller.
     """
 
@@ -45,10 +45,10 @@ class Host:
         controller: Controller,
         *sinks: Sink,
         ports: SocketPorts | None = None,
-        experience: Experience | None = None,
+        learning: PayloadLearning | None = None,
         survives: bool = False,
     ) -> None:
-        self.controller, self._experience, self._survives = controller, experience, survives
+        self.controller, self._learning, self._survives = controller, learning, survives
         self._ports = ports or SocketPorts()
         self.failure: str | None = None  # reason why the controller has stopped ticking; None while it ticks
         self._sinks = sinks
@@ -83,8 +83,8 @@ class Host:
             self.controller.session.lease, getattr(command, "token", None)
         ):
             self._note(entry)
-        if self._experience is not None and not isinstance(reply, Refused) and self._forgets(command):
-            self._experience.void()
+        if self._learning is not None and not isinstance(reply, Refused) and self._forgets(command):
+            self._learning.void()
         if isinstance(command, SimulationStep) and isinstance(reply, Done):
             reply = self._step(command, attend)
         return reply
@@ -135,9 +135,9 @@ class Host:
         return why
 
     def _tick(self) -> None:
-        controller, experience = self.controller, self._experience
-        if experience is not None and controller.cycle.mode.at_rest:
-            self._learn(experience)
+        controller, learning = self.controller, self._learning
+        if learning is not None and controller.cycle.mode.at_rest:
+            self._learn(learning)
         controller.begin_tick()
         news = self._carry_out_orders()
         io = controller.changed_io()
@@ -145,8 +145,8 @@ class Host:
             for sink in self._sinks:
                 sink.io(io)
         report, events = controller.complete_tick()
-        if experience is not None:
-            experience.watch(
+        if learning is not None:
+            learning.watch(
                 report.sample,
                 controller.assumed.present,
                 held=controller.motion.robot_mode is RobotMode.RUNNING,
@@ -161,13 +161,13 @@ class Host:
             self.socket(one)
         self.tell_raised()
 
-    def _learn(self, experience: Experience) -> None:
-        for beliefs, lesson, plan in experience.lessons():
+    def _learn(self, learning: PayloadLearning) -> None:
+        for beliefs, lesson, plan in learning.lessons():
             if beliefs.declared != self.controller.assumed.assumed:
                 continue  # outdated: another payload was declared, learnt or forgotten since
             self._note(Entry(tick=self._next, kind="lesson", message=msgspec.to_builtins(lesson)))
             self.controller.assumed.learn(lesson, plan)
-        for error in experience.raised():
+        for error in learning.raised():
             self.warn(f"a motion has taught nothing: {named(error)}")
             for sink in self._sinks:
                 sink.raised(error)

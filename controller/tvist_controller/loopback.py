@@ -5,8 +5,7 @@ from collections.abc import Callable
 from tvist_controller.controller import Controller
 from tvist_controller.host import Host
 from tvist_controller.instruments.report import Report, Sink, Topic
-from tvist_controller.safety.experience import Experience
-from tvist_controller.safety.payload_student import experience_of
+from tvist_controller.safety.payload_learning import PayloadLearning, payload_learning_of
 from tvist_controller.setup import Setup
 from tvist_plant.plant import Plant
 from tvist_protocol.codec import encode
@@ -21,18 +20,18 @@ class LoopbackHost(Sink):
     Args:
         setup: Initial setup with the clock `free` or `lockstep`.
         plant: Plant to control; None for the setup's flexible arm.
-        experience: What the robot learns from its motions; None for the setup's choice.
+        learning: What the robot learns from its motions; None for the setup's choice.
 
     Raises:
         ValueError: The setup is invalid, or the plant does not fit it.
     """
 
     def __init__(
-        self, setup: Setup, plant: Plant | None = None, experience: Experience | None = None
+        self, setup: Setup, plant: Plant | None = None, learning: PayloadLearning | None = None
     ) -> None:
         self.controller = Controller(setup, plant)
         self.entries: list[Entry] = []  # inputs of the controller; a replay needs only these and the setup
-        self._host = Host(self.controller, self, experience=experience or experience_of(setup))
+        self._host = Host(self.controller, self, learning=learning or payload_learning_of(setup))
         self._callbacks: dict[Topic, list[Callable[[bytes], object]]] = {}
 
     def request(self, client: str, data: bytes) -> bytes:  # noqa: ARG002  the network does not name its clients either

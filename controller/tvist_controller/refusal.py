@@ -29,6 +29,23 @@ class RefusalError(Exception):
         self.reply = Refused(code=code, where=where, why=why, limit=limit)
 
 
+def out_of_range(
+    field: str, value: object, must: str, limit: float | None = None, code: Code = "out_of_range"
+) -> RefusalError:
+    """Return the refusal of a field's value, which must be something else."""
+    return RefusalError(code, field, f"{field} is {value}: must be {must}", limit)
+
+
+def missing(field: str, why: str) -> RefusalError:
+    """Return the refusal of a command without a field that it needs."""
+    return RefusalError("missing_field", field, f"{field} is missing: {why}")
+
+
+def wrong_mode(why: str, field: str = "") -> RefusalError:
+    """Return the refusal of a command that is not possible now."""
+    return RefusalError("wrong_mode", field, why)
+
+
 def out_of_turn(command: str, activity: Activity) -> RefusalError:
     """Return the refusal of a command `type` that is not allowed in the present activity."""
     code: Code = "wrong_mode"
@@ -47,27 +64,24 @@ def out_of_turn(command: str, activity: Activity) -> RefusalError:
 
 def check_joints(q: Sequence[float], description: RobotDescription, where: str = "q") -> None:
     """Refuse a posture with a wrong number of joints or beyond a position limit."""
-    limits = description.limits.position
-    _check_each(q, limits, "limit_position", where, "angles; the arm has {}", "rad; the joint goes to ±{:g}")
+    _check_each(q, description.limits.position, "limit_position", where, "rad")
 
 
 def check_speeds(qd: Sequence[float], description: RobotDescription) -> None:
     """Refuse velocities with a wrong number of joints or above a limit."""
-    limits = description.limits.velocity
-    has, goes = "velocities; the arm has {} joints", "rad/s; the joint's limit is {:g}"
-    _check_each(qd, limits, "limit_velocity", "qd", has, goes)
+    _check_each(qd, description.limits.velocity, "limit_velocity", "qd", "rad/s")
 
 
-def _check_each(
-    values: Sequence[float], limits: Sequence[float], code: Code, where: str, has: str, goes: str
-) -> None:
+def _check_each(values: Sequence[float], limits: Sequence[float], code: Code, where: str, unit: str) -> None:
     count = len(limits)
     if len(values) != count:
-        raise RefusalError("out_of_range", where, f"{where} has {len(values)} {has.format(count)}", count)
+        why = f"{where} has {len(values)} values: must be {count}, one per joint"
+        raise RefusalError("out_of_range", where, why, count)
     for number, (value, limit) in enumerate(zip(values, limits, strict=True)):
         if not abs(value) <= limit:
-            field = f"{where}[{number}]"
-            raise RefusalError(code, field, f"{field} is {value:g} {goes.format(limit)}", limit)
+            raise out_of_range(
+                f"{where}[{number}]", f"{value:g} {unit}", f"within ±{limit:g} {unit}", limit, code
+            )
 
 
 def check_motion(
@@ -87,31 +101,26 @@ def check_acceleration(acceleration: float, description: RobotDescription, prefi
 
 
 def _check_limit(code: Code, name: str, value: float, highest: float, unit: str, prefix: str) -> None:
-    where = f"{prefix}{name}"
     if value > highest:
-        why = f"{where} is {value:g} {unit}; the arm's limit is {highest:g}"
-        raise RefusalError(code, where, why, highest)
+        must = f"at most {highest:g} {unit}, the arm's limit"
+        raise out_of_range(f"{prefix}{name}", f"{value:g} {unit}", must, highest, code)
     _check_least(name, value, unit, prefix)
 
 
 def _check_least(name: str, value: float, unit: str, prefix: str) -> None:
     if value < (lowest := SLOWEST[name]):
-        where = f"{prefix}{name}"
-        why = f"{where} is {value:g} {unit}; it must be at least {lowest:g}"
-        raise RefusalError("out_of_range", where, why, lowest)
+        must = f"at least {lowest:g} {unit}"
+        raise out_of_range(f"{prefix}{name}", f"{value:g} {unit}", must, lowest)
 
 
 def check_body(payload: Payload, where: str = "", rated: float = math.inf) -> None:
     """Refuse a payload that is too heavy or physically impossible."""
     prefix = f"{where}." if where else ""
     if payload.mass > rated:
-        field = f"{prefix}mass"
-        why = f"{field} is {payload.mass:g} kg; the arm is rated for {rated:g}"
-        raise RefusalError("out_of_range", field, why, rated)
+        must = f"at most {rated:g} kg, the arm's rating"
+        raise out_of_range(f"{prefix}mass", f"{payload.mass:g} kg", must, rated)
     if not is_real_body(payload.inertia):
-        field = f"{prefix}inertia"
-        why = f"{field} is {list(payload.inertia)}: no body has these moments of inertia"
-        raise RefusalError("out_of_range", field, why)
+        raise out_of_range(f"{prefix}inertia", list(payload.inertia), "the moments of inertia of a real body")
 
 
 def check_pace(velocity: float, acceleration: float, jerk: float, where: str = "") -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from tvist_controller.cell.description import Cell
 from tvist_controller.foresight.collision import CollisionModel
-from tvist_controller.paths.poses import placement
+from tvist_controller.kinematics.pose import placement
 from tvist_controller.sources.mode_source import ModeSource, first_source
 from tvist_controller.sources.own_plants import OwnPlant
 from tvist_controller.sources.own_shapers import OwnShaper
@@ -101,7 +101,7 @@ class Setup:
         joints = self.description.joints
         if len(self.q) != joints:
             model = self.description.robot.model
-            raise ValueError(f"start has {len(self.q)} angles; {model} has {joints} joints")
+            raise ValueError(f"start has {len(self.q)} angles: must be {joints}, one per joint of a {model}")
         if placed:
             self._check_start()
         if self.hidden is not None and (self.truth or self.plant is not None):
@@ -178,8 +178,7 @@ class Setup:
             "adapt": self.adapt,
         }
         content |= {name: value for name, value in optional.items() if value is not None}
-        recorded: dict[str, Any] = msgspec.to_builtins(content)
-        return recorded
+        return dict(msgspec.to_builtins(content))
 
     @classmethod
     def from_builtins(

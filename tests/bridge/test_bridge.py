@@ -96,7 +96,7 @@ def asked(description, count, seed):
         there = here + random.uniform(0.3, 1.0) * (far - here)
         speed = SPEEDS[random.integers(len(SPEEDS))]
         way = point_to_point(here, there, MotionLimits(*speed))
-        states = zip(*central_differences(way, PERIOD), strict=True)
+        states = zip(*central_differences(way), strict=True)
         light = all((np.abs(dynamics.torque(q, qd, 2.0 * qdd)) <= most).all() for q, qd, qdd in states)
         if light and is_free(collision, Move(tuple(here.tolist()), tuple(there.tolist()), payload.mass)):
             found, here = found + 1, there

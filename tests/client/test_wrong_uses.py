@@ -34,11 +34,11 @@ COMMANDS = {
     "text for angles": (lambda arm: arm.move_j("Q1"), "q must be a list, not a string"),
     "a number for angles": (lambda arm: arm.move_j(1.0), "q must be a list, not a number"),
     "None for an angle": (lambda arm: arm.move_j([None] * 6), r"q\[0\] must be a number, not null"),
-    "five angles": (lambda arm: arm.move_j(Q1[:5]), "q has 5 angles; the arm has 6"),
+    "five angles": (lambda arm: arm.move_j(Q1[:5]), "q has 5 values: must be 6"),
     "NaN": (lambda arm: arm.move_j([math.nan] * 6), r"q\[0\] is NaN"),
-    "an angle out of range": (lambda arm: arm.move_j([9.0] * 6), r"q\[0\] is 9 rad; .* ±6.28"),
+    "an angle out of range": (lambda arm: arm.move_j([9.0] * 6), r"q\[0\] is 9 rad: .* ±6.28"),
     "a negative limit": (lambda arm: arm.move_j(Q1, velocity=-1), "velocity is -1: must be more than 0"),
-    "a limit above the arm's": (lambda arm: arm.move_j(Q1, velocity=9), "velocity is 9 rad/s; .* 3.14"),
+    "a limit above the arm's": (lambda arm: arm.move_j(Q1, velocity=9), "velocity is 9 rad/s: .* 3.14"),
     "text in a pose": (lambda arm: arm.move_l([*POSE[:5], "0"]), r"pose\[5\] must be a number, not a string"),
     "an unknown orientation": (
         lambda arm: arm.move_c(POSE, POSE, orientation="fixed"), "orientation is 'fixed': must be one of"
@@ -63,7 +63,7 @@ COMMANDS = {
     "half a mode": (lambda arm: arm.set_shaper("zv", 1.5), "modes must be an integer, not a number"),
     "an unknown estimator": (lambda arm: arm.set_estimator("oracle"), "'oracle'"),
     "a short centre of mass": (lambda arm: arm.set_payload(1, [0, 0], [0] * 6), "com has 2 .* 3 entries, x y z"),
-    "too heavy": (lambda arm: arm.set_payload(50, [0] * 3, [1, 0, 0, 1, 0, 1]), "mass is 50 kg; .* 5"),
+    "too heavy": (lambda arm: arm.set_payload(50, [0] * 3, [1, 0, 0, 1, 0, 1]), "mass is 50 kg: .* 5"),
     "a negative output": (lambda arm: arm.set_digital_output(-1, on=True), "number is -1: must be from 0 to 17"),
     "no list of registers": (lambda arm: arm.set_registers("input_int", 1), "values must be a list"),
     "an unknown mode": (lambda arm: arm.reset(mode="DANCING"), "mode is 'DANCING': must be one of 'RUNNING'"),

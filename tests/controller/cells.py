@@ -5,7 +5,7 @@ import numpy as np
 
 from tvist_controller.cell.description import Cell, as_declared
 from tvist_controller.kinematics.arm import Arm
-from tvist_controller.paths.poses import Placement, placement
+from tvist_controller.kinematics.pose import Placement, placement
 
 from .robots import UR5E
 from .scripts import URSIM, a_robot
@@ -16,7 +16,7 @@ HERE = Placement(*Arm(UR5E, TOOL["tcp"]).pose(np.array(URSIM)))
 
 
 def part(away=(0,) * 6, **changes):
-    """A part at a pose in the frame of the tool centre point at the start."""
+    """A part at a pose relative to the tool centre point at the start."""
     pose = (HERE @ placement(away)).vector
     return {"name": "box", "mass": 1.5, "size": (0.06, 0.05, 0.08), "pose": pose} | changes
 
@@ -28,6 +28,6 @@ def a_cell(*parts, **changes):
 
 
 def in_cell(*parts, robot=None, **changes):
-    """A robot in such a cell, with the first tool declared."""
+    """A robot in this cell, with the first tool declared."""
     cell = a_cell(*parts, **changes)
     return a_robot(**({"cell": cell, "payload": as_declared(cell.tools[0])} | (robot or {})))

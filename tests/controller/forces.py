@@ -53,7 +53,7 @@ def touching(stiffness, *, gap=0.002, sensor=True, q=URSIM, arm=UR5E_IN_AIR, mas
 
 
 def pressed(robot, plant, ticks):
-    """Force of the surface in each tick [N]."""
+    """Return the force of the surface in each tick [N]."""
     forces = []
     for _ in range(ticks):
         robot.tick()
@@ -66,7 +66,6 @@ def places(robot):
 
 
 def protective(robot):
-    """Reasons of the protective stops."""
     return [event.why for event in robot.events if event.kind == "protective_stop"]
 
 

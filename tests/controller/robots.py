@@ -1,4 +1,4 @@
-"""Robots, cycles and controllers for the tests of the server."""
+"""Robots, control lines and controllers for tests."""
 
 import msgspec
 import numpy as np
@@ -29,7 +29,7 @@ ROUNDING = 1e-8
 
 
 def cut(joints: int) -> RobotDescription:
-    """The first joints of a UR5e, the disc on the last of them."""
+    """Return a UR5e reduced to its first joints, with the disc on the last one."""
     replace = msgspec.structs.replace
     names = UR5E.robot.joints[:joints]
     changes = {"robot": replace(UR5E.robot, model=f"UR5e-{joints}", joints=names)}
@@ -86,21 +86,19 @@ def calibration(mass: float = 5.0, robot: str = "UR5e", name: str = "test", **po
 
 
 class Line(ControlCycle):
-    """A control line with short names for what tests look at."""
+    """A control line with short names for tests."""
 
     at_rest = property(lambda self: self.mode.at_rest)
     reference = property(lambda self: self.sample.reference)
 
     def plan(self, target, limits: MotionLimits, speed: float = 1.0):
-        return quickest_motion(JointLine(self.reference, target), limits, H, speed)
+        return quickest_motion(JointLine(self.reference, target), limits, speed)
 
     def stream(self, stream_period: float, limits: MotionLimits) -> SetpointStream:
         """Follow set-points from rest; no guard watches."""
         spared, reach = self.filter.spared(limits), np.array(self.description.limits.position)
         torque = StreamTorqueMargin(self.description, self.dynamics)
-        return self.begin(
-            SetpointStream(self.reference, stream_period, spared, H, reach=reach, torque=torque)
-        )
+        return self.begin(SetpointStream(self.reference, stream_period, spared, reach=reach, torque=torque))
 
 
 def cycle(name: str = "zv", q=Q1, estimator=None, seed: int = 0, plant: Plant | None = None) -> Line:
@@ -110,14 +108,14 @@ def cycle(name: str = "zv", q=Q1, estimator=None, seed: int = 0, plant: Plant | 
 
 
 def stop(line: Line, deceleration: float | None):
-    """Stop a line; what is done, or None where a stop goes on."""
+    """Stop a line; return the plan, or None if a stop goes on."""
     if not hasattr(line, "stopper"):
         line.stopper = Stopper(line)
     return line.stopper.stop(deceleration)
 
 
 class NoArm:
-    """Stands for the arm where only its reference matters."""
+    """A plant that follows its commands exactly."""
 
     payload = UR5E.payload
 
@@ -132,7 +130,7 @@ class NoArm:
 
 
 def without_arm(*arguments, **named) -> Line:
-    """A `cycle` with nothing at its end."""
+    """A `cycle` whose plant follows exactly."""
     return cycle(*arguments, plant=NoArm(), **named)
 
 
@@ -142,7 +140,7 @@ def setup(description: RobotDescription = UR5E, **changes) -> Setup:
 
 
 class Kept(Sink):
-    """Keeps what a robot said, and what a replay needs."""
+    """Keeps events, journal and states."""
 
     def __init__(self) -> None:
         self.events, self.entries, self.states = [], [], []
@@ -150,7 +148,7 @@ class Kept(Sink):
 
 
 class Robot:
-    """A controller, the lease on it, and what came out of it."""
+    """A controller with a lease, and its output."""
 
     def __init__(
         self,

@@ -9,12 +9,11 @@ URSIM = (-1.60, -1.727, -2.203, -0.808, 1.595, -0.031)
 
 
 def script(*lines: str, name: str = "prog") -> str:
-    """A program of these lines."""
     return "\n".join((f"def {name}():", *(f"  {line}" for line in lines), "end", ""))
 
 
 def a_robot(**changes) -> Robot:
-    """A robot that programs move well."""
+    """A robot in a posture with room for moves."""
     return Robot(**({"q": URSIM, "shaper": "none"} | changes))
 
 
@@ -24,7 +23,7 @@ def start(robot: Robot, *lines: str, name: str = "prog"):
 
 
 def playing(robot: Robot) -> bool:
-    """Whether the program is under way."""
+    """Return whether the program is running."""
     return robot.controller.programs.state == "PLAYING"
 
 
@@ -44,11 +43,11 @@ def run(robot: Robot, *lines: str) -> Robot:
 
 
 def said(robot: Robot) -> list[str]:
-    """Texts that programs have written."""
+    """Return the texts that programs have written."""
     return [event.why for event in robot.events if event.kind == "text"]
 
 
 def failure(robot: Robot):
-    """The event of the error that ended a program; None if there was none."""
+    """Return the event of the error that ended a program, or None."""
     found = [event for event in robot.events if event.kind == "warning" and event.line is not None]
     return found[-1] if found else None

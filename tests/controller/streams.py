@@ -1,4 +1,4 @@
-"""Streams of set-points as networks deliver them, and what one looks at in what came of them."""
+"""Streams of set-points as networks deliver them, and checks of the resulting references."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from .robots import PAPER, ROUNDING, H
 
 
 def network(motion, period, seconds, *, seed=0, jitter=0.0, loss=0.0, twice=0.0, clock=0.0, burst=1):
-    """Set-points by the tick before which they come.
+    """Return set-points by the tick before which they arrive.
 
     Args:
         motion: Positions, shape (k, n), by times of shape (k,).
@@ -35,7 +35,7 @@ def network(motion, period, seconds, *, seed=0, jitter=0.0, loss=0.0, twice=0.0,
 
 
 def played(stream, arrivals, ticks):
-    """References of so many ticks, shape (ticks, n)."""
+    """Return the references of a number of ticks, shape (ticks, n)."""
     out = []
     for tick in range(ticks):
         for sequence, q in arrivals.get(tick, ()):
@@ -45,13 +45,13 @@ def played(stream, arrivals, ticks):
 
 
 def peaks(out, limits):
-    """Largest first, second and third difference as shares of their limits, shape (3,)."""
+    """Return the largest first, second and third difference relative to their limits, shape (3,)."""
     orders = enumerate((limits.velocity, limits.acceleration, limits.jerk), 1)
     return np.array([np.abs(np.diff(out, order, axis=0)).max() / H**order / limit for order, limit in orders])
 
 
 def assert_within(out, limits=PAPER, *, beyond=(1e-5, 1e-4)):
-    """Acceleration and jerk to rounding and shares of them, velocity to a tick of acceleration."""
+    """Check acceleration and jerk up to rounding, and velocity up to one tick of acceleration."""
     velocity, acceleration, jerk = peaks(out, limits)
     assert np.isfinite(out).all()
     assert velocity <= 1.0 + limits.acceleration * H / limits.velocity
@@ -60,11 +60,11 @@ def assert_within(out, limits=PAPER, *, beyond=(1e-5, 1e-4)):
 
 
 def there_and_back(limits: MotionLimits, way=(1.4, -1.0, 0.8, -0.5, 0.3, 2.0), dwell=0.3):
-    """A double-S there, a rest, and one back, again and again; positions by times."""
+    """Return positions by time of double-S motions to and fro with rests in between."""
     target, start = np.array(way), np.zeros(len(way))
     go, back = (
-        quickest_motion(JointLine(start, target), limits, H),
-        quickest_motion(JointLine(target, start), limits, H),
+        quickest_motion(JointLine(start, target), limits),
+        quickest_motion(JointLine(target, start), limits),
     )
     turn, cycle = go.duration + dwell, 2 * (go.duration + dwell)
 
@@ -77,7 +77,7 @@ def there_and_back(limits: MotionLimits, way=(1.4, -1.0, 0.8, -0.5, 0.3, 2.0), d
 
 
 def swinging(amplitudes, frequency=0.8, begin=1.5):
-    """Sines that begin with no acceleration and no jerk."""
+    """Return sines that begin without acceleration and jerk."""
     amplitudes = np.array(amplitudes, dtype=float)
 
     def at(times):
@@ -89,7 +89,7 @@ def swinging(amplitudes, frequency=0.8, begin=1.5):
 
 
 def minimum_jerk(way, duration=2.0):
-    """From rest to rest by a polynomial of fifth degree."""
+    """Return a motion from rest to rest along a polynomial of fifth degree."""
     way = np.array(way, dtype=float)
 
     def at(times):

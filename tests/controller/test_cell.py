@@ -1,4 +1,4 @@
-"""A cell follows the robot to the tick: wires, a gripper that answers as a Robotiq 2F, and parts that load the arm."""
+"""A cell follows the robot tick by tick: wires, a Robotiq 2F, and parts that load the arm."""
 
 import re
 
@@ -38,7 +38,7 @@ def warnings(robot):
 
 class TestWires:
     @given(st.lists(st.booleans(), max_size=200), st.integers(0, 30), st.booleans())
-    def test_an_input_is_its_output_some_ticks_ago_however_short_a_pulse_is(self, signal, ticks, inverted):
+    def test_a_wired_input_equals_its_output_delayed_even_for_short_pulses(self, signal, ticks, inverted):
         wires = Wires(
             [CellWire(output="standard 0", input="standard 0", after=ticks * PERIOD, inverted=inverted)]
         )
@@ -50,7 +50,7 @@ class TestWires:
         outputs = [False] * delay + [False, *signal]
         assert [bool(one) != inverted for one in inputs] == outputs[: len(inputs)]
 
-    def test_a_program_waits_for_an_input_that_an_output_sets_later(self):
+    def test_a_program_waits_for_an_input_that_a_wire_sets_later(self):
         robot = in_cell(wires=WIRES)
         tool, wait = (
             "textmsg(get_tool_digital_in(1))",
@@ -71,12 +71,12 @@ class TestProtocol:
         *[(wrong, b"?") for wrong in (b"SET ACT 2\n", b"SET POS\n", b"SET XYZ 1\n", b"GET XYZ")],
         (b"\xff\xfe\n", b"?"), (b"x" * 2000, b"?"),
     ])  # fmt: skip
-    def test_requests_are_answered_as_the_urcap_answers_them(self, request_, answered):
+    def test_gripper_requests_get_the_answers_of_the_urcap(self, request_, answered):
         gripper = Gripper(0.085, activated=False)
         assert b"".join(answer(gripper, one) for one in Requests().cut(request_)) == answered
 
     @given(st.data())
-    def test_requests_may_be_cut_anywhere(self, data):
+    def test_gripper_requests_may_be_split_anywhere(self, data):
         whole = b"SET POS 9\nSET SPE 3 FOR 4\n\nGET POS\nSET GTO 1\n"
         at = sorted(data.draw(st.sets(st.integers(1, len(whole) - 1)).filter(lambda cuts: 34 not in cuts)))
         requests = Requests()
@@ -95,7 +95,7 @@ class TestFingers:
         raise AssertionError(f"{register} never is {value}")
 
     @pytest.mark.parametrize(("speed", "seconds"), [(255, 0.085 / 0.15), (0, 0.085 / 0.02)])
-    def test_fingers_close_at_the_speed_that_is_set(self, speed, seconds):
+    def test_fingers_close_at_the_set_speed(self, speed, seconds):
         gripper = Gripper(0.085, activated=True)
         gripper.write({"POS": 255, "SPE": speed, "GTO": 1})
         assert gripper.read("OBJ") == 0
@@ -104,7 +104,7 @@ class TestFingers:
 
 
 class TestParts:
-    def test_a_part_stops_the_fingers_and_loads_the_arm_until_it_is_released_elsewhere(self):
+    def test_a_gripped_part_loads_the_arm_until_it_is_released(self):
         robot = in_cell(part((0.002, 0, 0, 0, 0, np.pi - 0.1)))  # half a turn swaps the fingers
         run(
             robot,
@@ -123,7 +123,7 @@ class TestParts:
         )
         assert carried(robot).mass == TOOL["mass"]
 
-    def test_what_is_carried_is_the_tool_and_the_part_where_it_is(self):
+    def test_the_carried_body_combines_tool_and_part(self):
         robot = in_cell(part((0, 0, 0.004, 0, 0, 0), cog=(0, 0, 0.01)))
         run(robot, "rq_close_and_wait()", "sleep(0.5)")
         load = carried(robot)
@@ -134,7 +134,7 @@ class TestParts:
         box = [1.5 / 12 * (a * a + b * b) for a, b in ((0.05, 0.08), (0.06, 0.08), (0.06, 0.05))]
         np.testing.assert_allclose([xx, yy, zz], np.add(box, [far, far, 0]), atol=2e-4)
 
-    def test_its_weight_goes_over_in_a_fifth_of_a_second_while_the_arm_stays_where_it_is(self):
+    def test_the_weight_of_a_part_is_transferred_gradually_to_a_resting_arm(self):
         robot = in_cell(part())
         start(robot, "rq_close_and_wait()", "sleep(1)")
         masses = [0.0]
@@ -153,14 +153,14 @@ class TestParts:
             ((0, 0, 0, 0, 0.5, 0), r"and 0\.(49|50) rad"),
         ],
     )
-    def test_a_part_out_of_reach_is_not_gripped_and_the_distance_is_said(self, away, said_):
+    def test_a_part_out_of_reach_is_not_gripped_and_a_warning_gives_its_distance(self, away, said_):
         robot = in_cell(part(away))
         run(robot, "rq_close_and_wait()", "textmsg(rq_is_object_detected(), rq_current_pos())")
         assert said(robot) == [f"False{CLOSED}"]
         assert any(re.search(said_, why) for why in warnings(robot))
         assert carried(robot).mass == TOOL["mass"]
 
-    def test_a_reset_begins_the_cell_anew(self):
+    def test_a_reset_restores_the_initial_cell(self):
         robot = in_cell(part())
         run(robot, "rq_close_and_wait()", "sleep(0.5)")
         robot.send(SimulationReset)
@@ -168,7 +168,7 @@ class TestParts:
         run(robot, "textmsg(rq_current_pos())", "rq_close_and_wait()", "textmsg(rq_is_object_detected())")
         assert said(robot)[-3::2] == [str(OPEN), "True"]
 
-    def test_a_tool_changer_exchanges_tools_and_a_part_stays_behind(self):
+    def test_a_tool_changer_swaps_tools_and_leaves_the_part_behind(self):
         other = TOOL | {"name": "hook", "mass": 0.3, "while_on": "tool 0"}
         robot = in_cell(part(), tools=[TOOL, other])
         run(robot, "rq_close_and_wait()", "sleep(0.5)", "set_tool_digital_out(0, True)", "sleep(0.1)")
@@ -200,18 +200,18 @@ socket_open("127.0.0.1", 63352, "1")""".splitlines()
 
 
 class TestPrograms:
-    def test_functions_that_a_program_brings_along_reach_the_gripper_by_a_socket_without_any_network(self):
+    def test_preamble_functions_reach_the_simulated_gripper_by_a_local_socket(self):
         robot = in_cell(part())
         run(robot, *PREAMBLE, "rq_close_and_wait()", 'textmsg(socket_get_var("POS", "1"))')
         assert said(robot)[1:] == ["by socket 2", str(round(CLOSED - 0.05 / 0.085 * (CLOSED - OPEN)))]
         assert robot.controller.programs.sockets.orders == []
 
-    def test_without_a_gripper_its_functions_say_so(self):
+    def test_gripper_functions_fail_without_a_gripper(self):
         robot = in_cell(gripper=None)
         run(robot, "rq_open()")
         assert "there is no gripper" in failure(robot).why
 
-    def test_a_program_that_does_not_activate_the_gripper_is_told(self):
+    def test_moving_an_inactive_gripper_fails(self):
         robot = in_cell(gripper={"model": "2F-85"})
         run(robot, "rq_close_and_wait()")
         assert "rq_activate_and_wait" in failure(robot).why
@@ -219,7 +219,7 @@ class TestPrograms:
         assert float(said(robot)[-1]) == pytest.approx(20.0, abs=0.2)
 
 
-def test_a_replay_is_equal_to_the_last_bit_with_what_clients_asked_of_the_gripper():
+def test_a_replay_with_gripper_requests_is_bit_equal():
     robot, kept = in_cell(part(), wires=WIRES), Kept()
     host = Host(robot.controller, kept)
     first = robot.controller.setup
@@ -240,7 +240,7 @@ def test_a_replay_is_equal_to_the_last_bit_with_what_clients_asked_of_the_grippe
     assert done.first_difference is None
 
 
-def test_parts_need_a_plant_that_can_carry_another_payload():
+def test_parts_need_a_plant_whose_payload_can_change():
     with pytest.raises(ValueError, match="the plant OwnArm cannot carry another payload"):
         Robot(cell=a_cell(part()), plant=OwnArm(UR5E, UR5E.payload))
     assert Robot(cell=a_cell(), plant=OwnArm(UR5E, UR5E.payload)).controller.cell is not None

@@ -1,4 +1,4 @@
-"""What changes while the arm moves, what is looked at before it is done, and the limits of every arm."""
+"""Changes during motion, checks before they apply, and the limits of every arm."""
 
 import itertools
 from pathlib import Path
@@ -12,9 +12,10 @@ from tvist_controller.about import info_of
 from tvist_controller.dispatch.planner import Planner
 from tvist_controller.foresight.stopper import Stopper
 from tvist_controller.foresight.stops import resting_after
+from tvist_controller.kinematics.arm import SLEW, InverseDynamics
 from tvist_controller.line.differentiator import STILL
-from tvist_controller.line.inverse_dynamics import SLEW, InverseDynamics
 from tvist_controller.line.limits import TORQUE_SHARE
+from tvist_controller.line.line_tick import TORQUE as TORQUE_ROW
 from tvist_controller.planning.move_planner import PlannedMove
 from tvist_controller.setup import body, paper_payload
 from tvist_controller.trajectory import MotionLimits
@@ -33,7 +34,7 @@ DISC = paper_payload(UR5E)
 
 
 @pytest.mark.parametrize("masses", [(5.0, 0.0), (1.0, 4.0)])
-def test_another_payload_makes_no_step_in_torque_and_ends_as_if_it_had_always_been(masses):
+def test_a_payload_change_in_motion_makes_no_torque_step(masses):
     first, then = (body(paper_payload(UR5E, mass)) for mass in masses)
     changed, never, always = (without_arm() for _ in range(3))
     for line, payload in ((changed, first), (never, first), (always, then)):
@@ -44,7 +45,7 @@ def test_another_payload_makes_no_step_in_torque_and_ends_as_if_it_had_always_be
     for tick in range(700):
         if tick == 100:
             changed.dynamics.declare(then)
-        torques.append([line.step().torque for line in (changed, never, always)])
+        torques.append([line.step().signals[TORQUE_ROW] for line in (changed, never, always)])
     torque, old, new = np.swapaxes(np.array(torques), 0, 1)
     assert (torque[:100] == old[:100]).all()
     np.testing.assert_allclose(torque[100 + SLEW :], new[100 + SLEW :], atol=1e-9)
@@ -58,7 +59,7 @@ def test_another_payload_makes_no_step_in_torque_and_ends_as_if_it_had_always_be
 
 
 @pytest.mark.parametrize("masses", [(5.0, 0.0), (0.0, 5.0)])
-def test_a_stop_while_the_payload_changes_is_safe_with_either(masses):
+def test_a_stop_during_a_payload_change_keeps_torque_limits_for_both_payloads(masses):
     line = without_arm()
     line.dynamics.declare(body(paper_payload(UR5E, masses[0])))
     line.reset(Q1)
@@ -86,7 +87,7 @@ CHANGES = [
 @pytest.mark.parametrize(
     "activity", [Activity.MOVING, Activity.STREAMING, Activity.ENDING, Activity.STOPPING]
 )
-def test_changes_are_done_in_motion_and_the_same_every_time(activity):
+def test_shaper_estimator_and_payload_changes_in_motion_are_reproducible(activity):
     robots = [at(activity, calibration=calibration()) for _ in range(2)]
     for robot in robots:
         for kind, fields in CHANGES:
@@ -103,7 +104,7 @@ def test_changes_are_done_in_motion_and_the_same_every_time(activity):
 
 
 @pytest.mark.parametrize("name", [*FITTING[:4], "none"])
-def test_what_is_foreseen_is_what_happens_to_the_bit(name):
+def test_the_simulated_future_of_the_line_is_bit_equal_to_the_real_one(name):
     random = np.random.default_rng(FITTING.index(name) if name in FITTING else 99)
     line = without_arm(name)
     motion = line.begin(line.plan(Q3, PAPER))
@@ -122,8 +123,8 @@ def test_what_is_foreseen_is_what_happens_to_the_bit(name):
 
 
 @pytest.mark.parametrize("shaper", ["none", "zv", "ei3"])
-def test_a_stream_whose_end_through_the_filter_would_meet_is_stopped_instead(shaper):
-    """With its own low acceleration the stream would come to rest in the floor; a hard stop does not."""
+def test_a_stream_is_stopped_if_its_filtered_end_would_collide(shaper):
+    """With its own low acceleration the stream would only rest inside the floor; a hard stop does not."""
     robot, start = Robot(), np.array([0.0, -1.6, 0.0, -1.57, 0.0, 0.0])
     robot.send(c.SetShaper, name=shaper)
     robot.send(SimulationReset, q=tuple(start))
@@ -145,7 +146,7 @@ def test_a_stream_whose_end_through_the_filter_would_meet_is_stopped_instead(sha
     assert all(model.meeting(q) is None for q in robot.column("target_q"))
 
 
-def test_info_says_how_long_stops_last():
+def test_info_lists_stopping_times_and_distances():
     info = info_of(Robot().controller).stopping
     assert [(row.payload, row.speed) for row in info] == [
         (mass, speed) for mass in (0.0, UR5E.limits.payload) for speed in (0.33, 0.66, 1.0)
@@ -166,7 +167,7 @@ acceleration, of which a shaper makes less where its impulses overlap less.
 
 
 def ratios(robot):
-    """Largest velocity, acceleration and torque of the shaped references over the joints' limits [-]."""
+    """Return the largest velocity, acceleration and torque relative to the limits [-]."""
     arm, q = robot.description, np.array(robot.references)
     torque = np.abs(torques(arm, robot.payload, q)) / arm.limits.torque
     return np.array([*speeds(arm, q), torque.max()])
@@ -178,7 +179,7 @@ def assert_kept(robot, *, torque=True):
 
 
 def moved(arm, shaper, start, goal, payload, limits):
-    """Make a move that is as quick as the arm can, and says what it is slower for; False if it would collide."""
+    """Make the quickest move; return what limits it, or False if it would collide."""
     robot = Subject(arm, np.array(start), payload, shaper=shaper)
     reply = robot.send(c.MoveJ, q=tuple(goal), **limits)
     if refused(reply):
@@ -209,9 +210,7 @@ def moved(arm, shaper, start, goal, payload, limits):
     ],
     ids=["seven", "ur30"],
 )
-def test_moves_that_are_heavy_for_a_moment_or_hardly_lighter_when_slower_keep_all_limits(
-    name, shaper, start, goal
-):
+def test_moves_limited_by_torque_peaks_or_gravity_keep_all_limits(name, shaper, start, goal):
     arm = load(name)
     assert moved(arm, shaper, start, goal, paper_payload(arm), own_limits(arm))
 
@@ -223,7 +222,7 @@ def paper_robot(shaper, pose="Q1"):
 
 
 @pytest.mark.parametrize("shaper", ["zv", "auto", "zvd"])
-def test_a_line_of_the_tool_keeps_the_torques_as_well(shaper):
+def test_a_tool_line_keeps_torque_limits(shaper):
     q = (0.0, -0.55, 1.0, -2.02, -1.57, 0.0)
     robot = paper_robot(shaper, q)
     x, y, z, *turn = robot.send(ForwardKinematics, q=q).pose
@@ -236,7 +235,7 @@ def test_a_line_of_the_tool_keeps_the_torques_as_well(shaper):
 
 
 @pytest.mark.parametrize("kind", ["servo_j", "speed_j"])
-def test_a_shaper_that_exceeds_more_slows_down_a_guided_motion(kind):
+def test_a_shaper_with_more_overshoot_slows_down_a_guided_motion(kind):
     robot = paper_robot("none")
     q1, q3 = (np.array(robot.description.poses[name]) for name in ("Q1", "Q3"))
     fastest = min(robot.description.limits.velocity) * (q3 - q1) / np.abs(q3 - q1).max()
@@ -254,8 +253,8 @@ def test_a_shaper_that_exceeds_more_slows_down_a_guided_motion(kind):
 
 
 @pytest.mark.parametrize("name", ["ur5e", "ur20"])
-def test_a_move_that_is_planned_in_the_tick_keeps_the_limits_and_names_what_made_it_slowest(name):
-    """It is slowed down by half for a torque, and then a little for a velocity."""
+def test_a_move_planned_within_a_tick_keeps_limits_and_names_the_binding_one(name):
+    """A torque halves its speed first, then a velocity reduces it a little."""
     arm = load(name)
     robot = Subject(arm, np.array(arm.poses["Q1"]), paper_payload(arm), shaper="zv")
     fields = {"velocity": min(arm.limits.velocity), "acceleration": 8.0, "jerk": 500.0}

@@ -1,4 +1,4 @@
-"""Where the arm would meet itself or the floor."""
+"""Collisions of the arm with itself and the floor."""
 
 import itertools
 
@@ -29,7 +29,7 @@ def model():
 
 
 def capsules(q, payload=UR5E.payload):
-    """Ends and radii of all bodies in the world, by forward kinematics of this test's own."""
+    """Return ends and radii of all bodies in the base frame, by the test's own forward kinematics."""
     arm = rigid_model(UR5E, Payload())
     data = arm.createData()
     pin.forwardKinematics(arm, data, q)
@@ -47,14 +47,14 @@ def capsules(q, payload=UR5E.payload):
 
 
 def distance(one, other):
-    """Between two capsules, by brute force along the axis of one."""
+    """Return the distance between two capsules, by brute force along one axis."""
     a, axis = one[0] + np.linspace(0.0, 1.0, 401)[:, None] * (one[1] - one[0]), other[1] - other[0]
     share = np.clip((a - other[0]) @ axis / max(axis @ axis, 1e-12), 0.0, 1.0)
     return np.linalg.norm(a - other[0] - share[:, None] * axis, axis=1).min() - one[2] - other[2]
 
 
 def gaps(q):
-    """Distances of the pairs that can meet, the floor among them."""
+    """Return the distances of all pairs that can meet, including the floor."""
     bodies = capsules(q)
     names = list(bodies)
     apart = {frozenset(pair) for pair in UR5E.collision.apart}
@@ -67,7 +67,7 @@ def gaps(q):
     return np.array(pairs + floor)
 
 
-def test_meetings_are_those_of_an_independent_geometry(model):
+def test_collisions_match_an_independent_geometry(model):
     met = 0
     for q in WORKSPACE.random(100, 6, seed=8):
         expected = gaps(q).min()
@@ -78,7 +78,7 @@ def test_meetings_are_those_of_an_independent_geometry(model):
     assert 5 < met < 100
 
 
-def test_a_way_that_is_found_free_is_free_by_small_steps(model):
+def test_a_path_found_free_is_free_in_small_steps(model):
     poses = [q for q in WORKSPACE.random(60, 6, seed=3) if model.meeting(q) is None]
     free = 0
     for start, end in itertools.pairwise(poses):
@@ -94,7 +94,7 @@ def test_a_way_that_is_found_free_is_free_by_small_steps(model):
     assert free > 20
 
 
-def test_a_move_that_would_collide_is_refused_with_the_pair_and_the_time():
+def test_a_colliding_move_is_refused_with_bodies_and_time():
     robot = Robot()
     reply = robot.send(c.MoveJ, q=tuple(DOWN))
     assert isinstance(reply, Refused)
@@ -114,8 +114,8 @@ def turned_wrists(number):
 
 
 @pytest.mark.parametrize("number", [7, 26, 124, 302, 509])
-def test_a_way_out_of_a_meeting_brings_no_pair_of_bodies_nearer(model, number):
-    """The nearest pair may move apart while another one, that meets as well, would come nearer."""
+def test_a_path_out_of_a_collision_brings_no_pair_of_bodies_closer(model, number):
+    """The nearest pair may separate while another pair, also too close, would come closer."""
     start = turned_wrists(number)
     assert model.meeting(start) is not None
     way = JointLine(start, start + np.random.default_rng([number, 1]).uniform(-0.5, 0.5, 6)).whole
@@ -133,7 +133,7 @@ INERTIA = (0.01, 0.0, 0.0, 0.01, 0.0, 0.01)
 
 
 @pytest.mark.parametrize(("name", "payload"), [("ur5e", "the paper's"), ("ur30", "far out")])
-def test_a_reset_into_a_meeting_is_refused_with_the_posture_and_the_bodies(name, payload):
+def test_a_reset_into_a_collision_is_refused_with_posture_and_bodies(name, payload):
     arm, robot = load(name), Robot(description=load(name))
     declared = PAYLOADS[payload] | {"mass": min(PAYLOADS[payload]["mass"], arm.limits.payload)}
     assert robot.send(c.SetPayload, **declared, inertia=INERTIA) == Done()
@@ -156,7 +156,7 @@ def test_a_reset_into_a_meeting_is_refused_with_the_posture_and_the_bodies(name,
     assert 1 < refused < 39
 
 
-def test_no_robot_starts_in_a_meeting():
+def test_a_robot_cannot_start_in_a_collision():
     with pytest.raises(ValueError, match=r"start: at q = \[0, 0.6, .*wrist_2 and floor would overlap by"):
         Robot(q=tuple(DOWN))
     far = Carried(mass=3.0, com=(0.3, 0.0, 0.3), inertia=INERTIA)
@@ -165,7 +165,7 @@ def test_no_robot_starts_in_a_meeting():
     Robot(q=(0.0,) * 6, description=UR5E.without_floor())
 
 
-def test_an_arm_in_a_meeting_may_be_put_at_rest_again_and_move_out_of_it_and_not_further_in():
+def test_an_arm_in_collision_may_move_out_but_not_further_in():
     robot, low = Robot(), np.array([0.0, -0.3, 0.0, -1.57, 0.0, 0.0])
     robot.send(SimulationReset, q=tuple(low))
     assert robot.send(c.SetPayload, mass=3.0, com=(0.3, 0.0, 0.3), inertia=INERTIA) == Done()

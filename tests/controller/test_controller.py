@@ -23,13 +23,13 @@ DISC = paper_payload(UR5E)
 
 
 def moving(robot: Robot, ticks: int = 200) -> int:
-    """Id of a motion that has been under way for some ticks."""
+    """Start a move and let it run for some ticks; return its number."""
     accepted = robot.send(c.MoveJ, q=Q3_)
     robot.tick(ticks)
     return accepted.id
 
 
-def test_a_move_is_accepted_announced_and_done():
+def test_a_move_is_accepted_started_and_done():
     robot = Robot()
     assert robot.send(c.MoveJ, q=Q2_) == Accepted(id=1)
     robot.tick()
@@ -52,7 +52,7 @@ def test_a_stream_is_followed_and_stopped():
     assert robot.send(c.MoveJ, q=Q1_) == Accepted(id=1)
 
 
-def test_a_stop_whose_deceleration_is_limited_says_so():
+def test_a_stop_reports_a_limited_deceleration():
     robot = Robot()
     moving(robot)
     robot.send(c.Stop, deceleration=1e5)
@@ -66,7 +66,7 @@ def test_a_stop_whose_deceleration_is_limited_says_so():
     assert told == [("stream_stopped", None), ("warning", "limit_acceleration")]
 
 
-def test_a_stop_at_rest_is_done_and_nothing_happens():
+def test_a_stop_at_rest_changes_nothing():
     robot, twin = Robot(), Robot()
     assert robot.send(c.Stop) == Done()
     robot.tick(50)
@@ -75,7 +75,7 @@ def test_a_stop_at_rest_is_done_and_nothing_happens():
     assert robot.events == []
 
 
-def test_an_estimator_is_chosen_and_announced():
+def test_choosing_an_estimator_emits_an_event():
     robot = Robot()
     assert robot.send(c.SetEstimator, name="fixed", f_d=(6.7,), zeta=(0.34,)) == Done()
     state = robot.tick()
@@ -87,7 +87,7 @@ def test_an_estimator_is_chosen_and_announced():
     assert robot.controller.assumed.source.name == "polynomial"
 
 
-def test_a_payload_is_declared_and_the_arm_keeps_what_it_carries():
+def test_declaring_a_payload_does_not_change_the_carried_one():
     robot = Robot()
     moments = robot.tick().target_moment
     assert robot.send(c.SetPayload, mass=1.0, com=DISC.com, inertia=DISC.inertia) == Done()
@@ -96,7 +96,7 @@ def test_a_payload_is_declared_and_the_arm_keeps_what_it_carries():
     assert info_of(robot.controller).payload.mass == 1.0
 
 
-def test_a_calibration_for_another_payload_is_a_warning_and_stands_in_info():
+def test_a_calibration_for_another_payload_causes_a_warning():
     robot = Robot(calibration=calibration(mass=2.0))
     robot.tick()
     assert [(e.kind, e.code) for e in robot.events] == [("warning", "payload_mismatch")]
@@ -111,7 +111,7 @@ def test_a_calibration_for_another_payload_is_a_warning_and_stands_in_info():
     assert robot.events[-1].code == "payload_mismatch"
 
 
-def test_a_reset_in_mid_motion_stops_it_and_everything_is_as_new():
+def test_a_reset_in_motion_stops_it_and_restores_the_initial_state():
     robot, fresh = Robot(), Robot(q=Q3_, seed=5)
     motion = moving(robot)
     robot.send(SimulationReset, q=Q3_, seed=5)
@@ -138,7 +138,7 @@ def stopped_within_limits(robot: Robot) -> None:
     assert robot.states[-1].target_q == robot.states[-301].target_q
 
 
-def test_a_lease_that_runs_out_in_mid_motion_stops_the_arm():
+def test_an_expired_lease_stops_a_moving_arm():
     robot = Robot(clock="realtime", lease_s=1.0)
     motion = moving(robot, 501)
     told = [(event.kind, event.id, event.tick) for event in robot.events[1:]]
@@ -154,7 +154,7 @@ def test_missed_ticks_are_published():
     assert robot.tick().missed_ticks == 3
 
 
-def test_the_truth_does_not_disturb():
+def test_reading_the_truth_does_not_change_the_run():
     told, untold = Robot(), Robot()
     for _ in range(120):
         told.tick()
@@ -164,7 +164,7 @@ def test_the_truth_does_not_disturb():
 
 
 @pytest.mark.parametrize("joints", [1, 2, 5])
-def test_a_robot_of_any_number_of_joints_works_throughout(joints):
+def test_robots_with_fewer_joints_support_all_basic_commands(joints):
     robot = Robot(cut(joints))
     target = tuple(np.array(robot.controller.setup.q) + 0.2)
     assert robot.send(c.MoveJ, q=target) == Accepted(id=1)
@@ -184,7 +184,7 @@ def test_a_robot_of_any_number_of_joints_works_throughout(joints):
     assert robot.send(c.MoveJ, q=Q1_).code == "out_of_range"
 
 
-def test_a_setup_that_cannot_be_is_a_value_error():
+def test_an_invalid_setup_raises_value_error():
     for wrong in (
         {"shaper": "zvdddd"},
         {"q": Q1_[:3]},
@@ -195,7 +195,7 @@ def test_a_setup_that_cannot_be_is_a_value_error():
             Controller(setup(**wrong))
 
 
-def test_before_the_first_tick_the_state_is_that_of_the_arm_at_rest_where_it_starts():
+def test_the_state_before_the_first_tick_is_the_arm_at_rest_at_its_start():
     robot = Robot()
     first = robot.controller.latest
     assert (first.tick, first.timestamp) == (0, 0.0)
@@ -209,7 +209,7 @@ def test_before_the_first_tick_the_state_is_that_of_the_arm_at_rest_where_it_sta
         assert getattr(first, mode) == getattr(after, mode)
 
 
-def test_who_subscribes_in_process_is_told_at_once_and_the_run_stays_the_same():
+def test_an_in_process_subscriber_gets_the_present_message_without_side_effects():
     told = []
     asked, unasked = LoopbackHost(free_setup()), LoopbackHost(free_setup())
     for _ in range(3):  # to ask often changes as little as to ask once

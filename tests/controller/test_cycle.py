@@ -1,4 +1,4 @@
-"""The control line as a whole: Figure 6."""
+"""The whole control line (Figure 6)."""
 
 import re
 from pathlib import Path
@@ -8,9 +8,9 @@ import pytest
 from tests.plant.arms import frames
 from tests.search.spaces import BENT, pose_of, tool_pose
 
+from tvist_controller.kinematics.arm import InverseDynamics
 from tvist_controller.line.differentiator import STILL, Target, central_differences
 from tvist_controller.line.drive_feed_forward import DriveFeedForward
-from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.line.joint_controllers import command_drives
 from tvist_controller.line.line_mode import LineMode, check_change
 from tvist_controller.setup import body, paper_payload
@@ -24,7 +24,7 @@ from .robots import FITTING, PAPER, Q1, Q3, UR5E, H, Robot, cut, without_arm
 
 
 def motion(line, target, limits=PAPER):
-    """Shaped reference at every tick of a motion, and for a while after; ticks until it was said to rest."""
+    """Return the shaped reference of a motion and after, and the ticks until rest."""
     line.begin(line.plan(np.array(target), limits))
     shaped, rested = [], None
     for tick in range(6000):
@@ -39,8 +39,8 @@ def motion(line, target, limits=PAPER):
 
 @pytest.mark.parametrize("name", FITTING)
 @pytest.mark.parametrize("target", [Q3, Q1 + 1e-3])
-def test_at_rest_is_one_tick_after_the_last_that_moved(name, target):
-    """A target is the shaped reference of a tick before, so that tick is two after the last that moved.
+def test_the_line_is_at_rest_soon_after_the_last_movement(name, target):
+    """The target is one tick behind the shaped reference, so rest is two ticks after the last movement.
 
     Up to two more where a small last impulse makes steps below 1e-7 rad that come to more than that together.
     """
@@ -52,8 +52,8 @@ def test_at_rest_is_one_tick_after_the_last_that_moved(name, target):
 
 
 @pytest.mark.parametrize("name", ["zv", "zvd", "ei3"])
-def test_a_plateau_between_two_impulses_is_no_rest(name):
-    """A jog of 0.1 mrad lasts 32 ms, the shaper 75 ms and more: in between the shaped reference stands still."""
+def test_a_plateau_between_two_impulses_does_not_count_as_rest(name):
+    """A jog of 0.1 mrad lasts 32 ms, the shaper 75 ms: the shaped reference stands in between."""
     line = without_arm(name, estimator=Fixed([6.7], [0.1]))
     shaped, rested = motion(line, Q1 + 1e-4)
     steps = np.abs(np.diff(shaped, axis=0)).max(axis=1)
@@ -63,14 +63,14 @@ def test_a_plateau_between_two_impulses_is_no_rest(name):
     assert (shaped[rested + 20 :] == Q1 + 1e-4).all()
 
 
-def test_a_stop_is_final_and_what_bypasses_the_filter_is_not_shaped_before_it_rests():
+def test_no_mode_without_filter_leads_to_a_shaped_one_before_rest():
     assert set(LineMode.STOPPING.followed_by) == {"REST", "STOPPING"}
     for mode in LineMode:
         if not mode.shaped:
             assert not any(LineMode[after].shaped for after in mode.followed_by if after != "REST")
 
 
-def test_every_pair_of_modes_is_judged_by_the_table():
+def test_mode_changes_follow_the_table():
     for before in LineMode:
         for after in LineMode:
             if after.name in before.followed_by:
@@ -84,7 +84,7 @@ FIELDS = ("q", "qd", "qdd")
 
 
 def unshaped(state):
-    """Position, velocity and acceleration before shaping; what is null is that of the target."""
+    """Return position, velocity and acceleration before shaping, by default those of the target."""
     return [
         own if (own := getattr(state, f"unshaped_{name}")) is not None else getattr(state, f"target_{name}")
         for name in FIELDS
@@ -127,11 +127,11 @@ def moved(motion, shaper, *, rest=50):
 
 @pytest.mark.parametrize("motion", MOTIONS)
 @pytest.mark.parametrize("shaper", ["zv", "ei"])
-def test_it_is_the_reference_of_a_tick_ago_with_its_central_differences(motion, shaper):
+def test_unshaped_values_are_central_differences_of_the_reference(motion, shaper):
     states = moved(motion, shaper).states
     reference = np.array([state.reference_q for state in states])
     assert np.abs(reference - np.array([state.target_q for state in states])).max() > 1e-3
-    for number, expected in enumerate(central_differences(reference, H)):
+    for number, expected in enumerate(central_differences(reference)):
         # Velocities are differences of neighbours here, which rounds in another way.
         np.testing.assert_allclose(
             column(states, number)[2:], expected, rtol=0.0, atol=(0.0, 1e-12, 0.0)[number]
@@ -139,7 +139,7 @@ def test_it_is_the_reference_of_a_tick_ago_with_its_central_differences(motion, 
 
 
 @pytest.mark.parametrize("motion", ["joints", "line"])
-def test_a_stop_takes_it_to_the_shaped_reference_without_a_peak_in_its_derivatives(motion):
+def test_unshaped_values_join_the_shaped_ones_in_a_stop_without_peaks(motion):
     start, begin = MOTIONS[motion]
     robot = Robot(q=tuple(start), shaper="zv")
     begin(robot)
@@ -156,7 +156,7 @@ def test_a_stop_takes_it_to_the_shaped_reference_without_a_peak_in_its_derivativ
     assert acceleration <= max(np.abs(shaped).max(), 2.1)
 
 
-def test_the_page_on_architecture_draws_the_modes_of_the_line():
+def test_the_architecture_page_draws_the_line_modes():
     picture = Path(__file__).parents[2] / "docs/images/line-modes.svg"
     drawn = " ".join(re.findall(r'data-ways="([^"]+)"', picture.read_text("utf-8"))).split()
     ways = {f"{mode.name}-{after}" for mode in LineMode for after in mode.followed_by if after != mode.name}
@@ -169,7 +169,7 @@ def tensor(values):
 
 
 def bodies(description, payload):
-    """Number of the link, mass, centre of mass and inertia of everything that moves."""
+    """Return link number, mass, centre of mass and inertia of all moving bodies."""
     links = description.links
     yield from zip(range(1, description.joints + 1), links.mass, links.com, links.inertia, strict=True)
     yield description.joints, payload.mass, payload.com, payload.inertia
@@ -206,7 +206,7 @@ def lagrange(description, payload, q, qd, qdd):
 
 
 @pytest.mark.parametrize("joints", [1, 2, 5, 6])
-def test_torques_are_those_of_lagrange(joints):
+def test_inverse_dynamics_matches_the_lagrange_equations(joints):
     description = cut(joints)
     payload = Payload(mass=3.0, com=(0.05, -0.02, 0.08), inertia=(0.01, 0.001, 0.0, 0.012, 0.0, 0.008))
     dynamics, random = InverseDynamics(description, payload), np.random.default_rng(joints)
@@ -226,16 +226,16 @@ def command_of(controllers, target, torque, gravity):
 
 
 def commanded(description, *targets):
-    """Last of several drive commands, with torque and gravity as inverse dynamics gives them."""
+    """Return the last of several drive commands, with torques of inverse dynamics."""
     dynamics = InverseDynamics(description, body(paper_payload(description)))
-    controllers = DriveFeedForward(description, H)
+    controllers = DriveFeedForward(description)
     for target in targets:
         torque, gravity = dynamics.torque(target.q, target.qd, target.qdd), dynamics.gravity(target.q)
         command = command_of(controllers, target, torque, gravity)
     return command, torque, gravity
 
 
-def test_the_feed_forward_has_rotor_inertia_and_a_share_of_coulomb_friction():
+def test_feed_forward_contains_rotor_inertia_and_part_of_coulomb_friction():
     drives = UR5E.drives
     target = Target(
         Q1, np.array([0.5, -0.5, 0.01, 0.0, 1.0, -0.02]), np.array([1.0, -2.0, 0.0, 3.0, 0.5, 0.1])
@@ -247,7 +247,7 @@ def test_the_feed_forward_has_rotor_inertia_and_a_share_of_coulomb_friction():
     assert command.torque == pytest.approx(torque + rotors + friction, rel=1e-14)
 
 
-def test_the_motor_leads_by_a_share_of_the_gears_wind_up_and_gravitys_own_is_left():
+def test_the_motor_leads_by_gear_wind_up_without_gravity():
     drives, still = UR5E.drives, np.zeros(6)
     moving = Target(Q1 + 0.1, still, np.array([1.0, -2.0, 0.5, 0.0, 0.0, 2.0]))
     command, torque, gravity = commanded(UR5E, Target(Q1, still, still), moving)

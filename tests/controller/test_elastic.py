@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.examples import examples
 
+from tvist_controller.kinematics.arm import InverseDynamics
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
 from tvist_controller.line.elastic_lead import follow
-from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.line.joint_controllers import LAWS, STICTION, described_friction
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.setup import Setup, body, paper_payload
@@ -40,13 +40,13 @@ def stage(description=UR5E, **how) -> ElasticFeedForward:
 
 
 def planned(shaper, description=UR5E, calibration=MODAL, *, q=Q1, mass=None):
-    """A filter by name, as a server makes it."""
+    """Return a filter by name, as a server makes it."""
     setup = Setup(description, tuple(q), paper_payload(description, mass), calibration, shaper=shaper)
     return FilterPlanner(setup).first()
 
 
 def line(shaper: str, q=Q1, *, mass=None, description=UR5E, calibration=MODAL, plant=None) -> Line:
-    """A control line with such a filter."""
+    """Return a control line with such a filter."""
     chosen = planned(shaper, description, calibration, q=q, mass=mass)
     payload = body(paper_payload(description, mass))
     return Line(
@@ -56,8 +56,8 @@ def line(shaper: str, q=Q1, *, mass=None, description=UR5E, calibration=MODAL, p
 
 
 def moves(cycle: Line, target, limits=PAPER):
-    """Make a motion, and yield its samples with 0.6 s of rest."""
-    cycle.begin(quickest_motion(JointLine(cycle.sample.reference, np.array(target)), limits, H))
+    """Make a motion; yield its samples and those of 0.6 s of rest."""
+    cycle.begin(quickest_motion(JointLine(cycle.sample.reference, np.array(target)), limits))
     cycle.tvist.aim(np.array(target))
     rest = 0
     while rest < 300:
@@ -66,12 +66,12 @@ def moves(cycle: Line, target, limits=PAPER):
 
 
 def ringing(cycle, target):
-    """Largest true acceleration of the tool later than 10 ms after the motion's end [m/s²]."""
+    """Return the tool's largest true acceleration later than 10 ms after the motion's end [m/s²]."""
     force = np.array([cycle.plant.truth().specific_force for _ in moves(cycle, target)])
     return np.linalg.norm(force - force[-1], axis=1)[-295:].max()
 
 
-def test_one_joint_leads_by_its_inertia_times_acceleration_over_stiffness():
+def test_a_single_joint_leads_by_inertia_times_acceleration_over_stiffness():
     description, stiffness = cut(1), 20_000.0
     feed = ElasticFeedForward(description, np.array([stiffness]), np.zeros(1), H)
     dynamics = InverseDynamics(description, Payload())
@@ -86,7 +86,7 @@ def test_one_joint_leads_by_its_inertia_times_acceleration_over_stiffness():
     assert feed.motors[1, 0] == pytest.approx(6.0 * earlier, abs=1e-6)
 
 
-def test_nothing_of_springs_and_gains_in_the_robot_file_is_used():
+def test_elastic_feed_forward_ignores_springs_and_gains_of_the_robot_file():
     replace, drives = msgspec.structs.replace, UR5E.drives
     names = (
         "gear_stiffness",
@@ -110,7 +110,7 @@ def test_nothing_of_springs_and_gains_in_the_robot_file_is_used():
 
 
 def followed(wanted, room):
-    """Follow a course of one joint; return the leads, and whether any acceleration was limited."""
+    """Follow the values of one joint; return the leads, and whether acceleration was limited."""
     led, window, out, limited = np.full((3, 1), wanted[0]), np.full((3, 1), wanted[0]), [], False
     for value in wanted:
         window[1:] = window[:-1].copy()
@@ -122,7 +122,7 @@ def followed(wanted, room):
 
 @examples(50)
 @given(seed=st.integers(0, 2**32 - 1), room=st.floats(1.0, 100.0))
-def test_a_rough_lead_is_followed_with_limited_acceleration_and_caught_up(seed, room):
+def test_a_rough_lead_is_followed_with_limited_acceleration(seed, room):
     steps = np.repeat(np.random.default_rng(seed).uniform(-2e-3, 2e-3, 6), 60)
     wanted = np.concatenate([[0.0] * 5, steps, [steps[-1]] * 600])
     led, limited = followed(wanted, room)
@@ -137,7 +137,7 @@ def test_a_rough_lead_is_followed_with_limited_acceleration_and_caught_up(seed, 
 
 
 @pytest.mark.parametrize(("mass", "start", "target"), [(5.0, Q3, Q2)])
-def test_the_arm_rests_a_hundred_milliseconds_earlier_than_it_would_and_nearly_still(mass, start, target):
+def test_elastic_shapers_leave_little_residual_vibration(mass, start, target):
     clean = UR5E.clean()
     left = {
         name: ringing(line(name, start, mass=mass, description=clean), target) for name in ("none", *NAMES)
@@ -148,7 +148,7 @@ def test_the_arm_rests_a_hundred_milliseconds_earlier_than_it_would_and_nearly_s
 
 
 @pytest.mark.parametrize("name", ["elastic-position", "elastic-auto"])
-def test_it_is_chosen_like_any_other_shaper_and_says_what_the_motors_do(name):
+def test_an_elastic_shaper_publishes_motor_motion_within_torque_limits(name):
     robot = Robot(calibration=calibration())
     assert robot.tick().motor_qd is None
     assert robot.send(c.SetShaper, name=name) == Done()
@@ -189,7 +189,7 @@ def act(robot, name, random):
 
 @examples(4)
 @given(seed=st.integers(0, 2**32 - 1))
-def test_position_and_velocity_of_the_motors_stay_continuous_through_whatever_happens(seed):
+def test_motor_position_and_velocity_stay_continuous_through_random_commands(seed):
     random = np.random.default_rng(seed)
     robot = Robot(calibration=calibration(), shaper="elastic", q=tuple(Q3))
     commands = watched_commands(robot)
@@ -208,7 +208,7 @@ def test_position_and_velocity_of_the_motors_stay_continuous_through_whatever_ha
     assert (np.abs(torque) <= LIMIT).all()
 
 
-def test_a_lead_that_the_torque_does_not_permit_is_limited_and_told():
+def test_a_lead_beyond_the_torque_limit_is_limited_and_reported():
     weak = msgspec.structs.replace(
         UR5E, limits=msgspec.structs.replace(UR5E.limits, torque=tuple(0.05 * t for t in UR5E.limits.torque))
     )
@@ -223,7 +223,7 @@ def test_a_lead_that_the_torque_does_not_permit_is_limited_and_told():
 
 
 def watched_commands(robot):
-    """Commands that the drives get from now on."""
+    """Return the list of drive commands from now on."""
     commands, step = [], robot.controller.cycle.plant.step
 
     def watched(command):
@@ -235,7 +235,7 @@ def watched_commands(robot):
 
 
 @pytest.mark.parametrize("other", ["zv", "elastic-auto"])
-def test_another_shaper_right_after_a_stop_waits_until_the_motors_have_come_back(other):
+def test_a_new_shaper_after_a_stop_waits_until_the_motors_have_settled(other):
     robot = Robot(calibration=calibration(), shaper="elastic", q=tuple(Q3))
     robot.send(c.MoveJ, q=tuple(Q1), velocity=3.0, acceleration=8.0, jerk=2000.0)
     robot.tick(380)
@@ -255,7 +255,7 @@ LARGEST = Imperfections.of(STICKS).stiction[0]
 
 
 def rigid(description: RobotDescription) -> RobotDescription:
-    """The arm with gears and links a hundred times as stiff, whose drives hold their motors on the commands."""
+    """Return the arm a hundred times as stiff, whose motors follow their commands."""
     replace, drives, links = msgspec.structs.replace, description.drives, description.link_flexibility
     stiff = replace(
         drives,
@@ -274,8 +274,8 @@ def rigid(description: RobotDescription) -> RobotDescription:
 
 
 @pytest.mark.parametrize("limits", [PAPER, MotionLimits(0.05, 0.2, 10.0)], ids=["paper", "creeping"])
-def test_it_equals_the_plants_own_stiction_in_a_motion_that_is_followed(limits, measured):
-    """There and back, so that every motor turns round while it is held."""
+def test_fed_forward_stiction_equals_the_stiction_of_the_plant(limits, measured):
+    """The arm moves to and fro, so that every motor reverses while it sticks."""
     description = rigid(STICKS)
     plant = FlexibleArm(description, description.payload, substeps=16)
     cycle = line("auto", description=description, calibration=STICKING, plant=plant)
@@ -294,7 +294,7 @@ def test_it_equals_the_plants_own_stiction_in_a_motion_that_is_followed(limits, 
     assert rms < 0.01 * largest
 
 
-def test_filters_made_for_known_friction_get_that_of_the_robot_file_in_full():
+def test_filters_with_known_friction_use_the_friction_of_the_robot_file():
     for shaper in (
         "auto",
         "auto-target",

@@ -1,4 +1,4 @@
-"""Force at the tool, force mode, freedrive and contacts: what gives way, what stays, and what ends it."""
+"""Force at the tool, force mode, freedrive and contacts: compliant and stiff axes, and how each ends."""
 
 import numpy as np
 import pinocchio as pin
@@ -25,18 +25,18 @@ six = st.tuples(one, one, one, one, one, one).map(np.array)
 
 
 @given(st.lists(six, min_size=1, max_size=30), st.floats(0.0, 1.0), st.floats(0.0, 2.0), st.floats(0.0, 2.0))
-def test_the_law_keeps_its_speeds_and_takes_no_more_energy_than_the_force_gives(forces, damping, gain, limit):
+def test_the_force_law_keeps_speed_limits_and_is_passive(forces, damping, gain, limit):
     task = ForceTask(np.ones(6), np.zeros(6), np.full(6, limit), damping, gain)
     inertia = task.mass * np.repeat([1.0, 0.22**2], 3)
     velocity = np.zeros(6)
     for force in forces:
-        before, velocity = velocity, compliant_velocity(task, velocity, force, PERIOD)
+        before, velocity = velocity, compliant_velocity(task, velocity, force)
         assert np.abs(velocity).max() <= limit
         gained = 0.5 * inertia * (velocity**2 - before**2)
         assert (gained <= gain * PERIOD * np.abs(force * velocity) + 1e-12).all()
 
 
-def test_a_sensor_is_read_without_the_weight_of_the_payload_however_the_tool_turns():
+def test_sensed_force_excludes_payload_weight_in_any_orientation():
     payload = Payload(mass=2.0, com=(0.01, -0.02, 0.05), inertia=(0.0,) * 6)
     robot, plant = feeling(payload=payload)
     plant.weight, plant.com, plant.pushed[:3] = 2.0, np.array(payload.com), [4.0, -3.0, 12.0]
@@ -56,7 +56,7 @@ def test_a_sensor_is_read_without_the_weight_of_the_payload_however_the_tool_tur
         assert robot.controller.io().actual_TCP_force == pytest.approx(wrench, abs=1e-9)
 
 
-def test_zeroing_a_sensor_takes_away_an_offset_of_its_own_frame():
+def test_zeroing_subtracts_an_offset_in_the_sensor_frame():
     robot, plant = feeling()
     plant.weight = 0.5  # which nobody has declared, so it turns with gravity and not with the sensor
     robot.tick()
@@ -69,8 +69,8 @@ def test_zeroing_a_sensor_takes_away_an_offset_of_its_own_frame():
     assert robot.controller.forces.wrench()[:3] == pytest.approx(np.array([0.0, 0.0, 5.0]) - zero, abs=1e-9)
 
 
-def test_in_the_air_the_tool_moves_along_the_wanted_force_and_in_no_other_direction():
-    """As ROS 2's test of its controller: +10 N, damping 0.1, gain 0.8; more than 3 cm in 5 s, others below 1 mm."""
+def test_in_free_air_the_tool_moves_along_the_wanted_force_only():
+    """As in ROS 2's test: +10 N, damping 0.1, gain 0.8; over 3 cm in 5 s, other axes below 1 mm."""
     robot, _ = touching(0.0)
     assert force_mode(robot, wrench=(0.0, 0.0, 10.0, 0.0, 0.0, 0.0), damping=0.1, gain=0.8) == Accepted(id=1)
     begun = np.array(robot.tick(1).actual_TCP_pose)
@@ -86,7 +86,7 @@ def test_in_the_air_the_tool_moves_along_the_wanted_force_and_in_no_other_direct
     ("stiffness", "sensor", "gain", "settled"), [(1e4, False, 1.0, 250), (1e5, True, 2.0, 500)]
 )
 def test_a_surface_is_pressed_with_the_wanted_force_without_bouncing(stiffness, sensor, gain, settled):
-    """Twice the usual gain is the largest that may be asked for."""
+    """The largest permitted gain is twice the usual one."""
     robot, plant = touching(stiffness, sensor=sensor)
     force_mode(robot, wrench=(0.0, 0.0, -20.0, 0.0, 0.0, 0.0), gain=gain)
     forces = pressed(robot, plant, 200 + settled)
@@ -95,7 +95,7 @@ def test_a_surface_is_pressed_with_the_wanted_force_without_bouncing(stiffness, 
     assert np.abs(forces[met + settled :] - 20.0).max() <= 2.0
 
 
-def test_an_axis_of_a_frame_gives_way_along_it():
+def test_a_compliant_axis_follows_its_task_frame():
     robot, _ = feeling()
     frame, chosen = (0.1, 0.2, 0.3, 0.4, -0.8, 0.5), [False, True, False, False, False, False]
     axes = pin.exp3(np.array(frame[3:]))
@@ -106,7 +106,7 @@ def test_an_axis_of_a_frame_gives_way_along_it():
     assert np.abs(np.delete(way, 1)).max() < 1e-7
 
 
-def test_type_1_pushes_to_the_origin_of_its_frame_and_type_3_across_the_way():
+def test_frame_types_1_and_3_align_with_the_origin_and_the_motion():
     robot, _ = feeling()
     across, here = (False, True, False, False, False, False), places(robot)[-1]
     origin = here + np.array([0.2, 0.1, 0.05])
@@ -125,7 +125,7 @@ def test_type_1_pushes_to_the_origin_of_its_frame_and_type_3_across_the_way():
     assert way @ np.array([0.6, 0.8, 0.0]) > 1e-3  # while the motion goes on
 
 
-def test_a_compliant_axis_keeps_its_speed_limit_and_the_others_their_place():
+def test_a_compliant_axis_keeps_its_speed_limit_and_stiff_axes_do_not_move():
     robot, plant = feeling()
     limits = (0.1, 0.1, 0.02, 0.5, 0.5, 0.5)
     force_mode(robot, wrench=(0.0, 0.0, -100.0, 0.0, 0.0, 0.0), limits=limits, damping=0.0)
@@ -136,7 +136,7 @@ def test_a_compliant_axis_keeps_its_speed_limit_and_the_others_their_place():
     assert np.abs(way[:, :2]).max() < 1e-6
 
 
-def test_a_force_beyond_what_a_robot_bears_is_a_protective_stop():
+def test_an_excessive_force_causes_a_protective_stop():
     robot, plant = feeling()
     plant.pushed[:3] = 200.0, 200.0, 0.0
     robot.tick(5)
@@ -147,7 +147,7 @@ def test_a_force_beyond_what_a_robot_bears_is_a_protective_stop():
     assert "above 250 N" in event.why
 
 
-def test_a_tool_that_leaves_its_way_in_force_mode_is_a_protective_stop_that_names_the_axis():
+def test_a_path_deviation_in_force_mode_causes_a_stop_that_names_the_axis():
     robot, plant = touching(0.0)
     force_mode(robot, limits=(0.1, 1e-4, 0.1, 0.5, 0.5, 0.5))
     plant.pushed = np.array([0.0, 60.0, 0.0])
@@ -158,7 +158,7 @@ def test_a_tool_that_leaves_its_way_in_force_mode_is_a_protective_stop_that_name
     assert "limits[1] is 0.0001" in event.why
 
 
-def test_end_force_mode_needs_something_to_end_and_force_mode_an_arm_that_may_be_taken_over():
+def test_end_force_mode_is_refused_without_force_mode():
     robot, _ = feeling()
     refused = robot.send(f.EndForceMode)
     assert isinstance(refused, Refused)
@@ -173,7 +173,7 @@ def test_end_force_mode_needs_something_to_end_and_force_mode_an_arm_that_may_be
     assert robot.controller.motion.activity is Activity.REST
 
 
-def test_the_arm_follows_a_hand_along_the_free_axes_and_stops_when_it_lets_go():
+def test_freedrive_follows_a_hand_along_free_axes_only():
     robot, plant = feeling()
     assert robot.send(f.Freedrive, free=(True, False, True, False, False, False)) == Accepted(id=1)
     plant.pushed[:3] = 20.0, 20.0, 0.0
@@ -186,8 +186,8 @@ def test_the_arm_follows_a_hand_along_the_free_axes_and_stops_when_it_lets_go():
     assert np.abs(np.diff(places(robot)[-2:], axis=0)).max() / H < 5e-3
 
 
-def test_a_hand_cannot_push_the_arm_through_a_singular_posture():
-    """It gets slower, says so, and keeps its limits."""
+def test_freedrive_does_not_pass_a_singular_posture():
+    """It slows down, reports this, and keeps its limits."""
     robot, plant = feeling()
     start(robot, "freedrive_mode()", "while True:", "write_output_integer_register(0, get_freedrive_status())",
           "sync()", "end")  # fmt: skip
@@ -212,7 +212,7 @@ def finished(robot, plant, *lines, most=6000):
     return np.array(forces)
 
 
-def test_moves_of_a_program_in_force_mode_keep_the_force_and_arrive():
+def test_program_moves_in_force_mode_keep_the_force_and_arrive():
     robot, plant = touching(1e4)
     here = places(robot)[-1]
     pose = ", ".join(f"{one!r}" for one in robot.states[-1].actual_TCP_pose)
@@ -228,7 +228,7 @@ def test_moves_of_a_program_in_force_mode_keep_the_force_and_arrive():
     assert np.abs(way[-1, :2]).max() < 1e-3
 
 
-def test_an_arc_in_force_mode_and_a_move_in_freedrive_are_refused_in_words():
+def test_arcs_in_force_mode_and_moves_in_freedrive_are_refused():
     for mode, move, why in (
         (MODE.format(0), "movec(get_actual_tcp_pose(), get_actual_tcp_pose())", "no arcs"),
         ("teach_mode()", f"movej({list(URSIM)})", "call end_freedrive_mode"),
@@ -240,8 +240,8 @@ def test_an_arc_in_force_mode_and_a_move_in_freedrive_are_refused_in_words():
 
 
 @pytest.mark.parametrize(("stiffness", "sensor"), [(1e5, True), (1e4, False), (0.0, False)])
-def test_a_contact_is_found_with_when_it_began_and_none_in_the_air(stiffness, sensor):
-    """As the scripts of UR's clients do: move until tool_contact says so, then back to where it began."""
+def test_tool_contact_finds_the_start_of_a_contact(stiffness, sensor):
+    """As scripts of UR's clients do: move until tool_contact reports one, then back to its start."""
     robot, plant = touching(stiffness, gap=0.02, sensor=sensor)
     finished(
         robot, plant, "s = 0", "i = 0", "while s == 0 and i < 800:", "s = tool_contact([0, 0, -1, 0, 0, 0])",

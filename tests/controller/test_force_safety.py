@@ -1,4 +1,4 @@
-"""What keeps force control safe: sensors that fall silent or change, stops, other tools, heavy payloads, threads."""
+"""Safety of force control: silent or changed sensors, stops, other tools, heavy payloads, threads."""
 
 import numpy as np
 import pytest
@@ -40,14 +40,14 @@ def sense(robot, wrench=SEVEN, **fields):
 
 
 def sensed(robot, ticks, wrench=SEVEN):
-    """Tick while a force sensor tells the same again and again."""
+    """Tick while a force sensor repeats its value."""
     for _ in range(ticks):
         sense(robot, wrench)
         robot.tick()
     return robot.states[-1]
 
 
-def test_force_mode_waits_for_the_first_value_of_a_sensor_of_ones_own():
+def test_force_mode_waits_for_the_first_value_of_an_external_sensor():
     robot, _ = feeling()
     start(robot, ENABLE, "sleep(9)")
     state = robot.tick(20)
@@ -61,7 +61,7 @@ def test_force_mode_waits_for_the_first_value_of_a_sensor_of_ones_own():
     assert force_mode(robot) == Accepted(id=1)
 
 
-def test_force_mode_ends_when_a_sensor_of_ones_own_falls_silent():
+def test_force_mode_ends_when_an_external_sensor_is_silent():
     robot, _ = feeling(clock="realtime")
     start(robot, ENABLE, "sync()", DOWN, "sleep(9)")
     sensed(robot, 200)
@@ -79,7 +79,7 @@ def test_force_mode_ends_when_a_sensor_of_ones_own_falls_silent():
     assert robot.tick(2).flange_wrench == pytest.approx([0.0] * 6)
 
 
-def test_nothing_of_a_sensor_of_ones_own_outlasts_the_program_or_a_placement():
+def test_an_external_sensor_is_dropped_after_the_program_or_a_reset():
     robot, _ = feeling()
     for end in (lambda: robot.tick(100), lambda: robot.send(SimulationReset)):
         start(robot, ENABLE, "sleep(.1)")
@@ -92,7 +92,7 @@ def test_nothing_of_a_sensor_of_ones_own_outlasts_the_program_or_a_placement():
         robot.tick(60)
 
 
-def test_a_sensor_of_ones_own_does_not_hide_that_the_arms_own_feels_too_much():
+def test_both_sensors_are_monitored_for_excessive_force():
     robot, plant = feeling()
     start(robot, ENABLE, "sleep(9)")
     sensed(robot, 20)
@@ -105,7 +105,7 @@ def test_a_sensor_of_ones_own_does_not_hide_that_the_arms_own_feels_too_much():
     assert "force at the tool is 260 N, above 250 N" in protective(robot)[0]
 
 
-def test_what_counts_as_zero_is_forgotten_with_the_sensor_it_belongs_to():
+def test_the_force_zero_is_dropped_when_the_sensor_changes():
     robot, plant = feeling()
     plant.pushed[2] = 5.0
     robot.tick()
@@ -125,7 +125,7 @@ def test_what_counts_as_zero_is_forgotten_with_the_sensor_it_belongs_to():
 
 
 @pytest.mark.parametrize("compliant", [(False, False, True, False, False, False), (True,) * 6])
-def test_a_force_that_is_no_number_stops_the_arm(compliant):
+def test_a_non_finite_force_stops_the_arm(compliant):
     robot, plant = feeling()
     force_mode(robot, compliant)
     robot.tick(20)
@@ -139,7 +139,7 @@ def test_a_force_that_is_no_number_stops_the_arm(compliant):
 
 @pytest.mark.parametrize("move", ["movel({}, a=.5, v=.02)", "servoc({}, a=.5, v=.02)"])
 @pytest.mark.parametrize("how", ["pause", "protective stop", "end_force_mode"])
-def test_a_move_in_force_mode_does_not_go_on_without_it(how, move):
+def test_a_move_in_force_mode_does_not_continue_without_it(how, move):
     robot, _ = feeling()
     there = "pose_trans(p[0.05,0,0,0,0,0], get_target_tcp_pose())"
     start(robot, DOWN, move.format(there))
@@ -162,7 +162,7 @@ def test_a_move_in_force_mode_does_not_go_on_without_it(how, move):
     assert np.abs(places(robot)[-1] - here).max() < 1e-4
 
 
-def test_a_move_in_force_mode_goes_on_after_a_pause_if_a_thread_keeps_calling_force_mode():
+def test_a_move_continues_after_a_pause_if_a_thread_restarts_force_mode():
     robot, plant = touching(1e4)
     start(robot, *KEEP, "sleep(1)",
           "movel(pose_trans(p[0.02,0,0,0,0,0], get_target_tcp_pose()), a=.5, v=.02)", "textmsg(1)",
@@ -182,8 +182,8 @@ def test_a_move_in_force_mode_goes_on_after_a_pause_if_a_thread_keeps_calling_fo
 KEEP = ("thread keep():", "while True:", DOWN, "sync()", "end", "end", "t = run keep()")
 
 
-def test_a_thread_gives_way_to_forces_beside_the_moves_of_another():
-    """As PolyScope writes it: a thread calls force_mode in every step, and moves begin at once."""
+def test_force_mode_of_one_thread_applies_to_moves_of_another():
+    """As PolyScope exports it: one thread calls force_mode in every step, while moves run in another."""
     robot, plant = touching(1e4)
     start(robot, "here = get_target_tcp_pose()", *KEEP,
           "movel(pose_trans(p[0.01,0,0,0,0,0], here), a=.5, v=.05, r=.002)", "sleep(.1)",
@@ -198,7 +198,7 @@ def test_a_thread_gives_way_to_forces_beside_the_moves_of_another():
     assert max(forces) == pytest.approx(20.0, abs=1.5)
 
 
-def test_a_payload_that_is_swung_about_is_not_taken_for_a_force():
+def test_payload_inertia_is_not_taken_for_a_force():
     arm = load("ur30").quiet().without_floor()
     robot, plant = touching(0.0, arm=arm, mass=30.0, q=(0.0, -1.3, 1.3, -1.57, -1.57, 0.0))
     felt = []
@@ -214,8 +214,8 @@ def test_a_payload_that_is_swung_about_is_not_taken_for_a_force():
     assert "above 250 N" in protective(robot)[0]
 
 
-def test_set_points_that_come_late_in_free_air_are_no_contact():
-    """As over a network: four times a second twelve ticks bring none, and the next one makes up for them."""
+def test_late_set_points_are_not_taken_for_a_contact():
+    """As over a network: four times a second twelve ticks bring none, and the next one catches up."""
     robot, _ = touching(0.0, mass=3.0)
     start(robot, "thread watch():", "s = 0", "while True:", "s = s + tool_contact(get_actual_tcp_speed())",
           "write_output_integer_register(0, s)", "sync()", "end", "end", "t = run watch()",
@@ -230,7 +230,7 @@ def test_set_points_that_come_late_in_free_air_are_no_contact():
     assert robot.controller.io().output_int_register[0] == 0
 
 
-def test_a_contact_is_judged_anew_when_the_force_is_taken_as_zero():
+def test_zeroing_the_force_restarts_contact_detection():
     robot, plant = feeling(payload=NOTHING)
     plant.pushed[2] = 30.0
     contact = "tool_contact([0, 0, -1, 0, 0, 0])"
@@ -282,9 +282,7 @@ COMMANDS = st.one_of(
 
 @examples(25)
 @given(st.lists(st.tuples(COMMANDS, st.integers(1, 40)), min_size=1, max_size=8), st.booleans())
-def test_whatever_comes_in_between_force_control_keeps_to_its_limits_and_tells_how_it_ended(
-    sequence, lockstep
-):
+def test_force_control_keeps_limits_and_reports_its_end_for_random_commands(sequence, lockstep):
     robot, plant = feeling(clock="free" if lockstep else "realtime", lease_s=3600.0)
     guidance, motion = robot.controller.guidance, robot.controller.motion
     limits, given_way, reference = UR5E_IN_AIR.limits, False, [robot.states[-1].reference_q] * 2

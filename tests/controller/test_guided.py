@@ -1,4 +1,4 @@
-"""Guided motions: servo_j, speed_j and speed_l, what they do, and how they begin and end."""
+"""Guided motions servo_j, speed_j and speed_l: their start, course and end."""
 
 import numpy as np
 import pytest
@@ -39,7 +39,7 @@ def last(robot):
 
 
 @pytest.mark.parametrize("shaped", [False, True])
-def test_a_run_of_commands_is_one_motion_that_is_done_at_rest(shaped):
+def test_consecutive_guided_commands_are_one_motion_done_at_rest(shaped):
     arm = robot()
     assert arm.send(m.SpeedJ, qd=(0.3, 0, 0, 0, 0, 0), shaped=shaped) == Accepted(id=1)
     arm.tick(100)
@@ -54,7 +54,7 @@ def test_a_run_of_commands_is_one_motion_that_is_done_at_rest(shaped):
     assert arm.send(m.ServoJ, q=tuple(HOME)) == Accepted(id=2)
 
 
-def test_a_planned_motion_is_taken_over_without_a_jump():
+def test_a_guided_motion_takes_over_a_planned_one_without_a_jump():
     arm = robot(shaper="zv")
     arm.send(c.MoveJ, q=BESIDE)
     arm.tick(150)
@@ -87,7 +87,7 @@ def test_only_a_motion_that_begins_at_rest_is_shaped():
 
 
 @pytest.mark.parametrize(("lookahead", "gain"), [(0.03, 1200.0), (0.1, 300.0), (0.1, 2000.0), (0.2, 100.0)])
-def test_a_ramp_is_followed_with_a_lag_of_lookahead_and_two_ticks(lookahead, gain):
+def test_servo_j_lags_a_ramp_by_its_lookahead_plus_two_ticks(lookahead, gain):
     arm, speed = robot(), 0.5
     for tick in range(1000):
         wanted = HOME[0] + speed * H * tick
@@ -101,7 +101,7 @@ def test_a_ramp_is_followed_with_a_lag_of_lookahead_and_two_ticks(lookahead, gai
     ("lookahead", "gain", "way"),
     [(0.03, 100.0, 1e-3), (0.03, 2000.0, 0.5), (0.1, 300.0, 0.5), (0.2, 2000.0, 0.03)],
 )
-def test_a_posture_is_reached_exactly_and_hardly_overshot(lookahead, gain, way):
+def test_servo_j_reaches_its_posture_with_hardly_any_overshoot(lookahead, gain, way):
     arm = robot()
     arm.send(m.ServoJ, q=(HOME[0] + way, *HOME[1:]), lookahead=lookahead, gain=gain)
     arm.until_rest()
@@ -144,7 +144,7 @@ def test_the_slider_stretches_a_step_at_constant_acceleration(fraction, ticks):
     assert steps[begun : begun + ticks + 1] == pytest.approx(expected, abs=1e-6)
 
 
-def test_reduced_speed_limits_what_is_guided():
+def test_reduced_mode_limits_guided_motions():
     most = 0.25 * UR5E.limits.velocity[0]
     for kind, fields in (
         (m.SpeedJ, {"qd": (1.5, 0, 0, 0, 0, 0), "acceleration": 5.0}),
@@ -168,18 +168,18 @@ def poses(arm, tcp=(0.0,) * 6):
 
 
 def off_line(pose, xd):
-    """Distances of the tool from a line from its start in this direction."""
+    """Return the tool's distances from a line from its start in this direction."""
     way, direction = pose[:, :3] - pose[0, :3], np.array(xd) / np.linalg.norm(xd)
     return np.abs(way - np.outer(way @ direction, direction)).max(axis=1)
 
 
 def ending(arm):
-    """The event of the first motion that was stopped."""
+    """Return the event of the first stopped motion."""
     return next(event for event in arm.events if event.kind == "motion_stopped")
 
 
 @pytest.mark.parametrize("tcp", [REST, (0.05, 0.0, 0.2, 0.0, 0.5, 0.0)])
-def test_the_tool_goes_straight_and_does_not_turn(tcp):
+def test_speed_l_moves_the_tool_straight_without_turning(tcp):
     arm, xd = robot(), np.array((-0.5, 0.05, 0.1))
     arm.send(SetTcp, offset=tcp)
     arm.send(m.SpeedL, xd=(*xd, 0.0, 0.0, 0.0))
@@ -192,7 +192,7 @@ def test_the_tool_goes_straight_and_does_not_turn(tcp):
     assert speed[-1] == pytest.approx(np.linalg.norm(xd), rel=1e-6)
 
 
-def test_before_a_singular_posture_the_tool_slows_down_and_then_stops():
+def test_speed_l_slows_down_and_stops_before_a_singular_posture():
     arm, xd = robot(), (0.25, 0.1, 0.1)
     arm.send(m.SpeedL, xd=(*xd, 0.0, 0.0, 0.0))
     arm.until_rest()

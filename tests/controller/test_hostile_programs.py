@@ -1,4 +1,4 @@
-"""What a hostile program can make a tick compute is bounded, by counts, and what has stopped does nothing any more."""
+"""Hostile programs compute little per tick, and stopped ones have no further effects."""
 
 import re
 import resource
@@ -12,7 +12,7 @@ from tests.search.scripts import Author
 from tvist_controller.dispatch.planner import Planner
 from tvist_controller.foresight.stopper import Stopper
 from tvist_controller.host import Host
-from tvist_controller.programs.journey import PAUSE
+from tvist_controller.programs.blended_moves import PAUSE
 from tvist_protocol import commands as c
 from tvist_protocol.codec import encode
 from tvist_protocol.programs import ProgramRun, ProgramStop
@@ -29,7 +29,7 @@ MOST = max(EVALUATIONS, MOST_OPERATIONS) + OVERDRAFT
 
 
 class Counts:
-    """Calls of a function in each tick."""
+    """Counts the calls of a function in each tick."""
 
     def __init__(self, monkeypatch, owner, name):
         self.of_tick, whole = 0, getattr(owner, name)
@@ -59,8 +59,8 @@ def spending(monkeypatch):
 
 
 @pytest.mark.parametrize("seed", [*range(4), 12, 93, 156])
-def test_no_tick_spends_more_than_the_budget_whatever_the_programs_do(seed, monkeypatch):
-    """All programs of the robot together; a statement that a tick began late is borne by the next one."""
+def test_no_tick_exceeds_the_evaluation_budget_with_hostile_programs(seed, monkeypatch):
+    """All programs of a robot share the budget; the next tick pays for a statement that began late."""
     robot, beside, _ = begin(seed)
     spent = spending(monkeypatch)
     solved = Counts(monkeypatch, type(robot.controller.programs.arm._access.motion.cycle.dynamics), "inertia")
@@ -77,11 +77,11 @@ def test_no_tick_spends_more_than_the_budget_whatever_the_programs_do(seed, monk
 
 
 @pytest.mark.parametrize("seed", [6, 81, 240, 490])
-def test_few_ticks_plan_or_stop_whatever_the_programs_do(seed, monkeypatch):
-    """Threads that are killed while they move, and short moves in quick succession, are held back."""
+def test_hostile_programs_cause_few_plans_and_stops(seed, monkeypatch):
+    """Threads killed while they move, and short moves in quick succession, are delayed."""
     robot, beside, _ = begin(seed)
     plans, stops = Counts(monkeypatch, Planner, "plan"), Counts(monkeypatch, Stopper, "plan_stop")
-    ticks, dear = 900, 0
+    ticks, dear = 600, 0
     for _ in range(ticks):
         robot.controller.begin_tick()
         robot.controller.complete_tick()
@@ -95,7 +95,7 @@ ENDS = ("halt", "protective_stop()", "x = 1 / 0")
 
 
 def stopping(seed):
-    """A random program that writes, moves and has threads, one of which ends or stops it at a random moment."""
+    """Return a random program with threads, one of which ends or stops it at a random moment."""
     random = np.random.default_rng(seed)
     head, body = Author(UR5E, np.array(URSIM), random).program("prog").split("\n", 1)
     end = ("thread t():", f"sleep({random.uniform(0.0, 0.3):.3f})", random.choice(ENDS), "end", "run t()")
@@ -112,22 +112,22 @@ def stopping(seed):
 
 
 def written(robot):
-    """What programs have written."""
+    """Return everything that programs have written."""
     places = robot.controller.peripherals
     numbers = [places.read("output_int", place) for place in range(4)]
     return places.digital_outputs, numbers, places.read("output_double", 1), list(places.analog_shares)
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_what_has_ended_or_stopped_does_nothing_any_more(seed):
-    """Not even in the same tick: after a stop no output, register or message changes, and no motion begins."""
+def test_ended_or_stopped_programs_have_no_further_effects(seed):
+    """After a stop no output, register or message changes, and no motion starts in its tick."""
     robot = a_robot()
     player = robot.controller.programs
     robot.send(ProgramRun, text=stopping(seed))
     at_stop, hear, known = [], player.hear, 0
 
     def watching(event):
-        """Look at what was written when the program stops, still within the tick."""
+        """Record what was written when the program stops, still within the tick."""
         hear(event)
         if event.kind in {"program_stopped", "protective_stop"} and not at_stop:
             at_stop.append((len(robot.controller.events), written(robot)))
@@ -148,7 +148,7 @@ def test_what_has_ended_or_stopped_does_nothing_any_more(seed):
 
 @pytest.fixture
 def little_memory():
-    """Let what takes more than a gigabyte fail."""
+    """Let allocations above a gigabyte fail."""
     used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     before = resource.getrlimit(resource.RLIMIT_AS)
     resource.setrlimit(resource.RLIMIT_AS, (used + (1 << 30), before[1]))
@@ -158,8 +158,8 @@ def little_memory():
 
 @pytest.mark.timeout(7200)
 @pytest.mark.parametrize("seeds", [range(40), pytest.param(range(40, 3000), marks=pytest.mark.nightly)])
-def test_a_random_program_with_odd_numbers_ends_alone(seeds, little_memory, monkeypatch):
-    """Nothing is raised out of a tick, or by a function that does not blame its arguments."""
+def test_random_programs_with_odd_numbers_raise_no_exception(seeds, little_memory, monkeypatch):
+    """No tick raises, and no function fails without blaming its arguments."""
     spent = spending(monkeypatch)
     for seed in seeds:
         robot = a_robot()
@@ -175,7 +175,7 @@ def test_a_random_program_with_odd_numbers_ends_alone(seeds, little_memory, monk
 
 
 class Heard(Kept):
-    """What a robot says."""
+    """Keeps output and errors."""
 
     def __init__(self):
         super().__init__()
@@ -187,7 +187,7 @@ def fails(*_):
     raise ArithmeticError("on purpose")
 
 
-def test_a_plan_that_fails_ends_its_program_which_names_the_line_and_is_logged(monkeypatch):
+def test_a_failing_plan_ends_its_program_with_its_line_and_is_logged(monkeypatch):
     robot, heard = a_robot(), Heard()
     monkeypatch.setattr(robot.controller.plans, "_order", lambda *_: fails)
     start(robot, "sync()", "movel(p[0.1, -0.4, 0.3, 2, 2, 0])")
@@ -200,7 +200,7 @@ def test_a_plan_that_fails_ends_its_program_which_names_the_line_and_is_logged(m
 
 
 @pytest.mark.parametrize(("part", "name"), [("motion", "step"), ("programs", "advance"), ("motion", "stop")])
-def test_what_fails_stops_the_robot_which_goes_on_when_it_is_unlocked(part, name, monkeypatch):
+def test_an_internal_failure_causes_a_protective_stop_that_can_be_unlocked(part, name, monkeypatch):
     robot, heard = a_robot(), Heard()
     host, owner = Host(robot.controller, heard, survives=True), getattr(robot.controller, part)
     start(robot, "sleep(1)")
@@ -327,7 +327,7 @@ def text(seed: int) -> tuple[list[str], tuple[float, ...]]:
 
 
 class Beside:
-    """Plans what programs order, between the ticks, as a served robot does next to them."""
+    """Plans orders of programs between the ticks, as a served robot does in parallel."""
 
     def __init__(self, robot) -> None:
         self.controller = robot.controller
@@ -346,7 +346,7 @@ class Beside:
 
 
 def begin(seed: int):
-    """Return a robot that runs the hostile program of a seed, and what plans for it."""
+    """Return a robot that runs the hostile program of a seed, and its planner."""
     texts, q = text(seed)
     robot = a_robot(q=q)
     beside = Beside(robot)
@@ -371,7 +371,7 @@ SETTINGS = (
 
 
 def odd(seed: int) -> str:
-    """A program that sets the robot up and moves it, with odd numbers among plausible ones."""
+    """Return a program that sets the robot up and moves it, with odd numbers among plausible ones."""
     r = Random(seed)
     share = r.choice((0.02, 0.1, 0.3))
     lines = [r.choice((r.choice(SETTINGS), r.choice(HOSTILE_MOVES))) for _ in range(r.randrange(1, 7))]

@@ -29,13 +29,13 @@ def state(robot):
 
 
 def said_at_rest(robot):
-    """What was said when the arm has come to rest, and the next statement has had its turn."""
+    """Return the texts written when the arm rests and the next statement has had its turn."""
     robot.until_rest()
     robot.tick(3)
     return said(robot)
 
 
-def test_statements_are_numbered_and_carried_out_in_their_order():
+def test_statements_are_numbered_and_executed_in_order():
     robot = waiting("a = 5")
     replies = [robot.send(ProgramInterpret, text=f"textmsg({text})") for text in ("a", "a + 1", '"c"')]
     assert replies == [Accepted(id=1), Accepted(id=2), Accepted(id=3)]
@@ -56,7 +56,7 @@ def test_a_statement_waits_for_the_motion_before_it():
     assert robot.states[-1].reference_q == pytest.approx(NEAR)
 
 
-def test_the_program_goes_on_after_end_interpreter():
+def test_the_program_continues_after_end_interpreter():
     robot = waiting(after=['textmsg("after")'])
     add(robot, "end_interpreter()")
     assert said(robot) == ["after"]
@@ -73,7 +73,7 @@ def test_the_program_goes_on_after_end_interpreter():
         ("sec f():\nend", "script_error", "text:1:5"),
     ],
 )
-def test_a_statement_that_is_not_valid_changes_nothing(text, code, where):
+def test_an_invalid_statement_changes_nothing(text, code, where):
     robot = waiting()
     refused = add(robot, text)
     assert isinstance(refused, Refused)
@@ -82,7 +82,7 @@ def test_a_statement_that_is_not_valid_changes_nothing(text, code, where):
     assert said(robot) == ["1"]
 
 
-def test_functions_and_variables_of_statements_are_forgotten_and_those_of_the_program_are_kept():
+def test_clear_interpreter_forgets_definitions_of_statements_only():
     robot = waiting("c = 0")
     add(robot, "def f():\n  return 7\nend")
     add(robot, "c = f() d = 1")
@@ -96,7 +96,7 @@ def test_functions_and_variables_of_statements_are_forgotten_and_those_of_the_pr
     assert said(robot) == ["7", "8"]
 
 
-def test_waiting_statements_are_skipped_and_the_present_move_goes_on():
+def test_skipping_waiting_statements_does_not_stop_the_present_move():
     robot = waiting()
     add(robot, f"movej({NEAR}, a=2, v=1)")
     add(robot, 'textmsg("there")')
@@ -108,7 +108,7 @@ def test_waiting_statements_are_skipped_and_the_present_move_goes_on():
 
 
 @pytest.mark.parametrize("move", ["movej", "movel"])
-def test_a_move_that_is_skipped_ends_where_it_stops_and_the_next_statement_follows(move):
+def test_a_skipped_move_stops_and_the_next_statement_follows(move):
     robot = waiting()
     add(robot, f"{move}({NEAR}, a=1, v=0.3)", 200)
     add(robot, 'textmsg("on")')
@@ -119,7 +119,7 @@ def test_a_move_that_is_skipped_ends_where_it_stops_and_the_next_statement_follo
 
 
 @pytest.mark.parametrize(("mode", "kept"), [("clearQueueOnEnter=False", ["later"]), ("", [])])
-def test_statements_that_are_left_over_wait_for_the_next_time_if_the_program_says_so(mode, kept):
+def test_remaining_statements_are_kept_if_the_program_asks_for_it(mode, kept):
     robot = waiting(after=[f"interpreter_mode({mode})"])
     robot.send(ProgramInterpret, text="end_interpreter()")
     robot.send(ProgramInterpret, text='textmsg("later")')
@@ -127,7 +127,7 @@ def test_statements_that_are_left_over_wait_for_the_next_time_if_the_program_say
     assert said(robot) == kept
 
 
-def test_only_the_main_program_waits_for_statements_and_only_once():
+def test_only_the_main_program_can_wait_for_statements():
     robot = waiting("def again():", "interpreter_mode()", "end")
     refused = add(robot, "interpreter_mode()")
     assert (refused.code, "in a statement" in refused.why) == ("script_error", True)
@@ -139,7 +139,7 @@ def test_only_the_main_program_waits_for_statements_and_only_once():
     assert "in a thread" in failure(robot).why
 
 
-def test_statements_that_come_before_the_program_waits_are_dropped_with_a_warning():
+def test_statements_sent_too_early_are_dropped_with_a_warning():
     robot = a_robot()
     start(robot, "sleep(0.1)", "interpreter_mode()")
     add(robot, 'textmsg("early")')
@@ -151,8 +151,8 @@ def test_statements_that_come_before_the_program_waits_are_dropped_with_a_warnin
     assert "statements 1 to 2" in warning
 
 
-def test_a_move_is_skipped_before_it_has_begun():
-    """A line is planned for some ticks after it was called."""
+def test_a_move_can_be_skipped_before_it_starts():
+    """A line is planned for some ticks after the call."""
     robot = waiting()
     before = robot.states[-1].reference_q
     add(robot, f"movel({NEAR}, a=1, v=0.3)", 2)
@@ -166,7 +166,7 @@ def test_a_move_is_skipped_before_it_has_begun():
     assert robot.states[-1].reference_q == pytest.approx(NEAR)
 
 
-def test_long_statements_are_limited_together():
+def test_the_total_length_of_statements_is_limited():
     robot = waiting()
     text = "# " + "x" * (MAX_SCRIPT // 2 - 50) + "\na = 1"
     replies = [robot.send(ProgramInterpret, text=text) for _ in range(3)]
@@ -177,7 +177,7 @@ def test_long_statements_are_limited_together():
     assert state(robot).cleared == 3
 
 
-def test_the_end_of_the_program_ends_the_statements():
+def test_statements_end_with_the_program():
     robot = waiting()
     add(robot, "sleep(10)")
     add(robot, "textmsg(1)")

@@ -32,7 +32,7 @@ RIGHT = np.pi / 2
 
 
 def arm(a, d, alpha, limit=2 * np.pi):
-    """A description with these parameters."""
+    """Return a description with these parameters."""
     joints = len(a)
     base = UR5E if joints == 6 else chain(joints)
     base = changed(base, "kinematics", a=tuple(a), d=tuple(d), alpha=tuple(alpha))
@@ -40,7 +40,7 @@ def arm(a, d, alpha, limit=2 * np.pi):
 
 
 def random_ur(rng):
-    """An arm with parallel axes 2, 3, 4 and lengths of any sign, some of them zero."""
+    """Return an arm with parallel axes 2, 3, 4 and lengths of any sign, some of them zero."""
     a, d = rng.uniform(-0.5, 0.5, (2, 6))
     a[[1, 2]] += np.sign(a[[1, 2]]) * 0.1
     a[4] = 0.0
@@ -53,7 +53,7 @@ def random_ur(rng):
 
 
 def random_spherical(rng):
-    """An arm with a spherical wrist and lengths of any sign, some of them zero."""
+    """Return an arm with a spherical wrist and lengths of any sign, some of them zero."""
     a, d = rng.uniform(-0.5, 0.5, (2, 6))
     a[1] += np.sign(a[1]) * 0.1
     d[3] += np.sign(d[3]) * 0.1
@@ -83,7 +83,7 @@ def pose_of(description, q):
 
 
 def error(description, pose, q):
-    """Largest error of position [m] and rotation [rad], by the textbook's products."""
+    """Return the largest error of position [m] and rotation [rad], by textbook products."""
     found = forward_kinematics(description, q)
     return max(np.linalg.norm(found[:3, 3] - pose[1]), np.linalg.norm(found[:3, :3] - pose[0]) / np.sqrt(2))
 
@@ -93,7 +93,7 @@ def wrapped(difference):
 
 
 def improved(table, links, pose, near):
-    """What `all_postures` finds, each improved as far as its error is not rounding; rows without one begin with NaN."""
+    """Return the postures of `all_postures`, each refined to rounding; rows without one begin with NaN."""
     found = np.empty((8, 6))
     inverse.all_postures(table, links, *pose, near, found)
     for row in range(8):
@@ -106,7 +106,7 @@ def improved(table, links, pose, near):
 
 
 def every(description, pose):
-    """The distinct postures that have a pose, whatever the ranges; those next to zero of a curve of them."""
+    """Return the distinct postures of a pose in any range; of a curve, those next to zero."""
     table, links, zero = arm_table(description), Arm(description).chain, np.zeros(description.joints)
     table[:-1, 4] = 2 * np.pi
     if table[-1, 0] != ANY:
@@ -123,7 +123,7 @@ def every(description, pose):
 
 
 def nearest(postures, near, limit):
-    """The smallest distance, of all postures and all their representations in the range."""
+    """Return the smallest distance over all postures and their representations in range."""
     least = np.inf
     for posture in postures:
         total = 0.0
@@ -154,7 +154,7 @@ FREE = {
 
 
 def missed(description, pose, rng, starts=64):
-    """Postures that a numerical search finds and the closed form does not have."""
+    """Return postures that a numerical search finds and the closed form lacks."""
     links, known = Arm(description).chain, every(description, pose)
     for start in rng.uniform(-np.pi, np.pi, (starts, description.joints)):
         q = start.copy()
@@ -167,7 +167,7 @@ def missed(description, pose, rng, starts=64):
 @pytest.mark.parametrize(
     "make", [lambda _: UR5E, random_ur, random_spherical], ids=["ur5e", "ur", "spherical"]
 )
-def test_the_nearest_posture_is_returned_and_none_is_missed(make, measured):
+def test_closed_form_inverse_kinematics_finds_the_nearest_posture_and_misses_none(make, measured):
     """Arms have any lengths and signs; all their postures are computed in closed form."""
     rng, worst = np.random.default_rng(3), 0.0
     for _ in range(share(100)):
@@ -195,7 +195,7 @@ OTHERS = [load("one-joint"), *(chain(n) for n in range(1, 8)), *(cut(n) for n in
 
 
 @pytest.mark.parametrize("description", OTHERS, ids=lambda arm: f"{arm.robot.name}-{arm.joints}")
-def test_other_arms_are_solved_numerically(description):
+def test_arms_without_closed_form_are_solved_numerically(description):
     rng, ik = np.random.default_rng(4), InverseKinematics(description)
     assert not ik._closed
     limit = np.minimum(description.limits.position, np.pi)
@@ -215,8 +215,8 @@ def test_other_arms_are_solved_numerically(description):
 
 @pytest.mark.parametrize("place", [(0.0, 0.0, 0.3), (0.05, 0.0, 0.5), (3.0, 0.0, 0.0), (np.nan, 0.0, 0.0)])
 @pytest.mark.parametrize("description", [UR5E, PUMA, chain(6), cut(4)], ids=["ur", "puma", "chain", "short"])
-def test_a_place_that_no_posture_reaches_has_no_solution(description, place):
-    """The first two are beside the UR's axis 1, nearer than the shoulder's offset."""
+def test_an_unreachable_pose_has_no_solution(description, place):
+    """The first two are closer to the UR's axis 1 than the shoulder's offset."""
     if description in (PUMA, chain(6)) and np.linalg.norm(place) < 1.0:
         place = (0.0, 2.0, 0.0)
     flange = np.array(place) + np.array([0.0, 0.0, UR5E.kinematics.d[5]])
@@ -226,7 +226,7 @@ def test_a_place_that_no_posture_reaches_has_no_solution(description, place):
 
 
 @pytest.mark.parametrize("description", [UR5E, chain(4)], ids=["closed", "numerical"])
-def test_a_posture_out_of_range_is_told_from_none(description):
+def test_a_solution_out_of_range_is_distinguished_from_no_solution(description):
     q = np.array([0.5, -1.0, 1.2, 0.4, 0.6, 0.7])[: description.joints]
     pose = pose_of(description, q)
     limits = tuple(0.1 for _ in q)
@@ -240,7 +240,7 @@ def test_a_posture_out_of_range_is_told_from_none(description):
 
 
 @pytest.mark.parametrize("case", FREE)
-def test_the_nearest_posture_is_found_where_postures_merge_or_a_joint_is_free(case):
+def test_the_nearest_posture_is_found_at_singularities(case):
     description, q = FREE[case]
     q, rng, ik = np.array(q), np.random.default_rng(6), InverseKinematics(description)
     links, pose = Arm(description).chain, pose_of(description, q)
@@ -280,7 +280,7 @@ def cases(description, number=20):
 @pytest.mark.parametrize(
     "description", ARMS, ids=lambda description: f"{description.robot.name}-{description.joints}"
 )
-def test_pose_jacobian_velocity_and_acceleration_of_the_tool_are_pinocchios(description):
+def test_tool_kinematics_match_pinocchio(description):
     bare = Arm(description)
     body = (
         RigidBody(description) if description.joints >= 6 else None
@@ -308,7 +308,7 @@ def test_pose_jacobian_velocity_and_acceleration_of_the_tool_are_pinocchios(desc
 
 @pytest.mark.parametrize("solve", [solve_in_place, solve_in_place.py_func], ids=["compiled", "python"])
 @given(st.integers(1, 24), st.integers(0, 2**32 - 1))
-def test_it_solves_as_lapack_does_and_knows_the_determinant(solve, n, seed):
+def test_the_cholesky_solver_matches_lapack(solve, n, seed):
     random = np.random.default_rng(seed)
     root, x = random.normal(size=(n, n)), random.normal(size=n)
     A = root @ root.T
@@ -326,7 +326,7 @@ STRETCHED = (0.3, -1.0, 0.0, 0.0, 0.0, 0.2)
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-6, 0.1, 1.0, np.pi - 1e-7, np.pi - 1e-12, np.pi])
-def test_a_rotation_vector_is_that_of_its_rotation(angle):
+def test_a_rotation_vector_converts_back_to_its_rotation(angle):
     random = np.random.default_rng(1)
     for _ in range(30):
         axis = random.standard_normal(3)
@@ -339,7 +339,7 @@ def test_a_rotation_vector_is_that_of_its_rotation(angle):
 
 
 def by_numpy(J, torque):
-    """Damped least squares as the documentation says."""
+    """Return damped least squares as documented."""
     tall = J.shape[1] <= J.shape[0]
     square = J.T @ J if tall else J @ J.T
     manipulability = np.sqrt(max(np.linalg.det(square), 0.0))
@@ -349,7 +349,7 @@ def by_numpy(J, torque):
 
 
 @pytest.mark.parametrize("offset", OFFSETS, ids=["flange", "tool"])
-def test_the_force_is_that_of_the_formula(offset):
+def test_the_estimated_force_matches_damped_least_squares(offset):
     arm, random = Arm(UR5E, offset), np.random.default_rng(4)
     for q in (*random.uniform(-2.0, 2.0, (20, 6)), np.array(STRETCHED)):
         torque, found = random.uniform(-50.0, 50.0, 6), np.empty(6)

@@ -1,4 +1,4 @@
-"""The limiter: inside the limits, and exact again afterwards."""
+"""The limiter keeps limits, and is exact again afterwards."""
 
 import numpy as np
 import pytest
@@ -16,14 +16,13 @@ from .robots import PAPER, Q1, Q3, H, Robot
 from .streams import assert_within
 
 
-def at_rest(q, limits, period, reach=np.inf, torque=None):
-    """A limiter that starts at rest."""
+def at_rest(q, limits, reach=np.inf, torque=None):
     still = np.zeros_like(q)
-    return Limiter((q, still, still), limits, period, np.broadcast_to(reach, q.shape), torque)
+    return Limiter((q, still, still), limits, np.broadcast_to(reach, q.shape), torque)
 
 
 def followed(limiter: Limiter, points) -> np.ndarray:
-    """What comes out for a walk from rest; with each point goes the slope of the parabola through the last three."""
+    """Return the output for a walk from rest, with slopes of parabolas through three points."""
     out, before, last = [limiter.q], limiter.q, limiter.q
     for point in points:
         rise, fall = point - last, last - before
@@ -44,13 +43,11 @@ def followed(limiter: Limiter, points) -> np.ndarray:
         jerk=st.floats(10.0, 2000.0),
     ),
 )
-def test_random_walks_stay_within_the_limits_are_caught_up_with_and_then_equalled(
-    seed, joints, roughness, limits
-):
+def test_the_limiter_keeps_limits_and_catches_up_with_random_walks(seed, joints, roughness, limits):
     random = np.random.default_rng(seed)
     walk = np.cumsum(np.cumsum(random.normal(0, roughness, (150, joints)), axis=0) / 10, axis=0)
     walk = np.clip(walk, -6.0, 6.0)
-    limiter = at_rest(np.zeros(joints), limits, H)
+    limiter = at_rest(np.zeros(joints), limits)
     out = followed(limiter, walk)
     way = np.abs(out[-1] - walk[-1]).max()
     ramps = limits.velocity / limits.acceleration + 4 * limits.acceleration / limits.jerk
@@ -74,11 +71,11 @@ def test_random_walks_stay_within_the_limits_are_caught_up_with_and_then_equalle
         lambda t: 0.05 * (1 - np.cos(2.5 * t)) ** 2,
     ],
 )
-def test_after_catching_up_with_what_moves_it_passes_to_the_bit_again(motion, jump):
-    """The closer, the slower: as fast as the signal could still brake, so that it is not overshot."""
+def test_the_limiter_passes_a_moving_signal_unchanged_after_catching_up(motion, jump):
+    """It approaches no faster than the signal could still brake, so that it does not overshoot."""
     time = np.arange(2500) * H
     walk = np.stack([motion(time) + jump * (time > 1.0), 0.1 * motion(time)], axis=1)
-    limiter = at_rest(walk[0], PAPER, H)
+    limiter = at_rest(walk[0], PAPER)
     out = followed(limiter, walk[1:])
     assert_within(out, beyond=(2e-6, 1e-5))
     equal = out == walk
@@ -93,7 +90,7 @@ def test_after_catching_up_with_what_moves_it_passes_to_the_bit_again(motion, ju
 
 
 class Narrow:
-    """Torque that permits an acceleration, of the number of states asked for."""
+    """Torque that permits an acceleration, by number of queried states."""
 
     def __init__(self, limit):
         self.limit, self.asked = limit, 0
@@ -108,14 +105,14 @@ class Narrow:
 
 @examples(10)
 @given(seed=st.integers(0, 2**32 - 1))
-def test_a_limit_that_falls_in_motion_is_kept_to_what_jerk_needs(seed):
-    """Acceleration is taken back at the jerk limit; until then it is beyond by what the limit fell."""
+def test_a_falling_torque_limit_is_kept_within_the_jerk_limit(seed):
+    """Acceleration decreases at the jerk limit; until then it exceeds the limit by its fall."""
     random = np.random.default_rng(seed)
     swing = random.uniform(0.02, 0.1, 3)
     time = np.arange(1500) * H
     walk = swing * (1 - np.cos(random.uniform(2, 6) * time))[:, None] ** 2
     torque = Narrow(lambda asked: 1.0 + 0.7 * (1 + np.cos(0.01 * asked)))
-    limiter = at_rest(np.zeros(3), PAPER, H, torque=torque)
+    limiter = at_rest(np.zeros(3), PAPER, torque=torque)
     excess, before = 0.0, (limiter.q, limiter.q)
     for point, last in zip(walk[1:], walk, strict=False):
         q = limiter.follow(point, (point - last) / H)
@@ -126,10 +123,10 @@ def test_a_limit_that_falls_in_motion_is_kept_to_what_jerk_needs(seed):
 
 
 @pytest.mark.parametrize("speed", [0.3, 1.0, 2.5])
-def test_a_joint_whose_torque_is_low_still_stops_inside_its_range(speed):
-    """Its stop is judged by the acceleration that the torque permits, which is what it stops with."""
+def test_a_joint_with_little_torque_stops_inside_its_range(speed):
+    """Its stop uses the acceleration that torque permits."""
     reach, weak = 2.0, Narrow(lambda _: 4.0)
-    limiter = at_rest(np.zeros(2), MotionLimits(3.0, 40.0, 2000.0), H, reach=np.full(2, reach), torque=weak)
+    limiter = at_rest(np.zeros(2), MotionLimits(3.0, 40.0, 2000.0), reach=np.full(2, reach), torque=weak)
     ramp = np.minimum(speed * H * np.arange(4000), reach)
     out = followed(limiter, np.column_stack((ramp, -ramp)))
     assert np.abs(out).max() <= reach
@@ -140,7 +137,7 @@ angles = st.floats(-6.28, 6.28)
 
 
 def played(motion: PlannedMotion, start) -> np.ndarray:
-    """All references, the start first and the target for some ticks at the end."""
+    """Return all references: the start first, and the target for some ticks at the end."""
     points = [start]
     while not motion.finished:
         points.append(motion.next())
@@ -154,14 +151,14 @@ def played(motion: PlannedMotion, start) -> np.ndarray:
     acceleration=st.floats(0.5, 40.0),
     jerk=st.floats(10.0, 2000.0),
 )
-def test_limits_hold_by_differences_and_the_end_is_exact(ends, velocity, acceleration, jerk):
-    """Differences over a tick are means over it, and so within the limits; the last tick is cut at the target.
+def test_planned_motions_keep_limits_by_differences_and_end_exactly(ends, velocity, acceleration, jerk):
+    """Differences over a tick are means over it and so within limits; the last tick ends at the target.
 
     Rounding of ε = 2e-16 in 2π is worth 2ε·2π/h in velocity, 4ε·2π/h² in acceleration, 8ε·2π/h³ in jerk; that
     of ruckig's own polynomials is some ten times more.
     """
     start, target = np.array(ends).T
-    motion = quickest_motion(JointLine(start, target), MotionLimits(velocity, acceleration, jerk), H)
+    motion = quickest_motion(JointLine(start, target), MotionLimits(velocity, acceleration, jerk))
     assert motion.duration < 300.0
     points = played(motion, start)
     assert (points[-1] == target).all()
@@ -176,8 +173,8 @@ TOLERANCE = 1.002
 
 
 def with_speeds(speeds, limits=PAPER, most=20_000):
-    """A motion from Q1 to Q3 with the speed given at each tick; positions, and rates after each tick."""
-    motion = quickest_motion(JointLine(Q1, Q3), limits, H)
+    """Move from Q1 to Q3 with the speed given for each tick; return positions and rates after each tick."""
+    motion = quickest_motion(JointLine(Q1, Q3), limits)
     q, rates = [Q1, Q1], []
     for tick in range(most):
         motion.speed = speeds(tick)
@@ -194,7 +191,7 @@ def accelerations(q):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_whatever_the_slider_does_acceleration_and_velocity_stay_inside_the_limits(seed):
+def test_speed_changes_keep_velocity_and_acceleration_limits(seed):
     random = np.random.default_rng(seed)
     speeds = np.repeat(random.choice([0.0, 0.1, 0.5, 0.8, 1.0], 400), random.integers(5, 200, 400))
     q, _ = with_speeds(lambda tick: float(speeds[tick]) if tick < len(speeds) else 1.0)
@@ -203,7 +200,7 @@ def test_whatever_the_slider_does_acceleration_and_velocity_stay_inside_the_limi
     assert np.array_equal(q[-1], Q3)
 
 
-def test_half_speed_from_the_start_takes_twice_as_long_on_the_same_way():
+def test_half_speed_takes_twice_as_long_on_the_same_path():
     robot = Robot()
     assert robot.send(c.SetSpeed, fraction=0.5) == Done()
     robot.send(c.SetShaper, name="none")
@@ -219,7 +216,7 @@ def test_half_speed_from_the_start_takes_twice_as_long_on_the_same_way():
     assert {state.speed_scaling for state in robot.states} == {0.5}
 
 
-def test_a_pause_brings_the_arm_to_rest_on_its_way_and_resume_takes_it_to_the_target():
+def test_pause_stops_on_the_path_and_resume_continues_to_the_target():
     robot = Robot()
     robot.send(c.MoveJ, q=tuple(Q3))
     robot.tick(500)

@@ -1,4 +1,4 @@
-"""Programs of many points close to each other: the arm does not stand still, and what comes late it waits for."""
+"""Paths of many close points: the arm does not stop in between, and waits for late points."""
 
 import numpy as np
 import pytest
@@ -19,14 +19,14 @@ APART, ROUND, SPEED, ACCELERATION = 1.5e-3, 0.05, 0.5, 2.0
 
 
 def circle(count):
-    """Points on a circle through where the arm is, shape (count, 3) [m]."""
+    """Return points on a circle through the present position, shape (count, 3) [m]."""
     angles = 2.0 * np.arcsin(0.5 * APART / ROUND) * np.arange(1, count + 1)
     around = np.column_stack((np.sin(angles), 1.0 - np.cos(angles), np.zeros(count)))
     return np.array(HERE[:3]) + ROUND * around
 
 
 def zigzag(count):
-    """Rows of 30 mm, 6 mm apart."""
+    """Return rows of 30 mm, 6 mm apart."""
     steps = ([[1, 0, 0]] * 20 + [[0, 1, 0]] * 4 + [[-1, 0, 0]] * 20 + [[0, 1, 0]] * 4) * (count // 48 + 1)
     return np.array(HERE[:3]) + APART * np.cumsum(steps[:count], axis=0)
 
@@ -40,19 +40,19 @@ def moves(points, radius=5e-4):
 
 
 def tool(robot):
-    """Positions of the tool, of the shaped reference, one a tick [m]."""
+    """Return positions of the tool at the shaped reference, one per tick [m]."""
     return np.array([KINEMATICS.pose(np.array(state.target_q))[1] for state in robot.states])
 
 
 def speeds(robot):
-    """Speed of the tool between the first and the last moment at which it moves, without 0.1 s at both ends [m/s]."""
+    """Return the tool's speed while it moves, without 0.1 s at both ends [m/s]."""
     speed = np.linalg.norm(np.diff(tool(robot), axis=0), axis=1) / H
     moving = np.flatnonzero(speed > 1e-6)
     return speed[moving[0] : moving[-1] + 1][50:-50]
 
 
 def away(robot, points):
-    """Largest distance of the tool from the lines between the points [m]."""
+    """Return the tool's largest distance from the lines between the points [m]."""
     corners, worst = np.vstack((HERE[:3], points)), 0.0
     starts, ways = corners[:-1], np.diff(corners, axis=0)
     for place in tool(robot):
@@ -73,8 +73,8 @@ def begin(points, ticks=0, **changes):
 
 
 @pytest.mark.parametrize("shaper", ["none", "zv"])
-def test_the_arm_goes_along_points_as_fast_as_their_curve_permits_and_never_stands_still(shaper):
-    """Without its ends, which last longer with a shaper, it takes at most 1.25 times the circle's quickest time."""
+def test_dense_points_are_followed_quickly_without_stops(shaper):
+    """Without its ends, it takes at most 1.25 times the circle's quickest time."""
     points = circle(200)
     robot = finish(begin(points, shaper=shaper))
     between = speeds(robot)
@@ -112,7 +112,7 @@ CHANGES = {
 @examples(2)
 @example([(1, "heavy"), (102, "heavy")])
 @given(st.lists(st.tuples(st.integers(1, 120), st.sampled_from(list(CHANGES))), max_size=6))
-def test_whatever_is_changed_on_the_way_it_stays_on_the_path_and_comes_to_its_end(changes):
+def test_random_changes_keep_the_arm_on_its_path(changes):
     points = circle(40)
     robot = begin(points, 90)
     for ticks, what in changes:
@@ -126,7 +126,7 @@ def test_whatever_is_changed_on_the_way_it_stays_on_the_path_and_comes_to_its_en
     assert away(robot, points) < 2e-5
 
 
-def test_a_stop_on_the_way_ends_it_on_the_path():
+def test_a_stop_ends_on_the_path():
     points = circle(100)
     robot = begin(points, 230)
     robot.send(c.Stop)
@@ -137,7 +137,7 @@ def test_a_stop_on_the_way_ends_it_on_the_path():
     assert away(robot, points) < 2e-5
 
 
-def test_after_a_protective_stop_it_goes_on_to_the_end_and_not_back_to_points_that_the_stop_has_passed():
+def test_a_path_resumes_after_a_protective_stop_without_going_back():
     points = circle(120)
     robot = begin(points, 230)
     robot.controller.motion.protect("a test")
@@ -154,8 +154,8 @@ def test_after_a_protective_stop_it_goes_on_to_the_end_and_not_back_to_points_th
     assert away(robot, points) < 5e-5
 
 
-def test_a_stop_before_tight_corners_is_as_quick_as_one_on_a_line():
-    """The motion slows down for its corners by itself, so no one limit suits the way to the end of a stop."""
+def test_a_stop_before_tight_corners_is_quick_and_stays_on_the_path():
+    """The motion slows down for its corners, so no single limit suits the whole stop."""
     points, ticks = zigzag(150), 295
     robot = begin(points, ticks, shaper="zv")
     robot.controller.motion.protect("a test")
@@ -185,7 +185,7 @@ def sent(points):
     return "".join(f"({x:.9f},{y:.9f},{z:.9f})\n" for x, y, z in points).encode()
 
 
-def test_points_that_come_over_a_socket_in_time_are_one_motion():
+def test_points_received_in_time_by_a_socket_are_one_motion():
     points = circle(150)
     robot, far = opened(*READS)
     for number in range(0, 150, 3):
@@ -198,7 +198,7 @@ def test_points_that_come_over_a_socket_in_time_are_one_motion():
     np.testing.assert_allclose(tool(robot)[-1], points[-1], atol=1e-8)
 
 
-def test_where_the_next_point_comes_too_late_the_arm_stops_at_the_last_one_and_says_so():
+def test_the_arm_stops_with_a_warning_if_the_next_point_is_late():
     points = circle(80)
     robot, far = opened(*READS)
     far.tell("received", sent(points[:60]))

@@ -1,10 +1,10 @@
-"""Power, protective stops and reduced speed: what the table of transitions says is what happens."""
+"""Power, protective stops and reduced speed follow the table of transitions."""
 
 import numpy as np
 import pytest
 
 from tvist_controller.line.limits import REDUCED_SHARE
-from tvist_controller.safety.monitors import TICKS
+from tvist_controller.motion.monitors import TICKS
 from tvist_protocol import commands as c
 from tvist_protocol import motions as m
 from tvist_protocol.modes import RobotMode, SafetyMode
@@ -36,22 +36,22 @@ STOPS = {"stop", "stop_j", "stop_l"}
 
 
 def at(activity: Activity, **changes) -> Robot:
-    """A robot that does this, brought there by commands."""
+    """Return a robot brought into an activity by commands."""
     robot = Robot(**changes)
     if activity in {Activity.POWER_OFF, Activity.IDLE}:
         robot.send(SimulationReset, mode=activity.value)
     elif activity in {Activity.STREAMING, Activity.ENDING}:
-        robot.stream(200)
+        robot.stream(100)
         if activity is Activity.ENDING:
             robot.send(c.ServoStop)
     elif activity is Activity.GUIDED:
         robot.send(m.ServoJ, q=Q3_)
-        robot.tick(100)
+        robot.tick(40)
     elif activity is Activity.PROTECTIVE_STOP:
         robot.send(SimulationInject, fault="protective_stop")
     elif activity is not Activity.REST:
         robot.send(c.MoveJ, q=Q3_)
-        robot.tick(300)
+        robot.tick(120)
         ends = {
             Activity.PAUSED: (c.Pause, {}),
             Activity.STOPPING: (c.Stop, {}),
@@ -67,7 +67,7 @@ def at(activity: Activity, **changes) -> Robot:
 
 
 @pytest.mark.parametrize("activity", Activity)
-def test_a_command_leads_where_the_table_says_or_is_refused(activity):
+def test_commands_follow_the_transition_table(activity):
     refusing = at(activity)
     for command, (kind, fields) in COMMANDS.items():
         target = after(activity, command)
@@ -84,12 +84,12 @@ def test_a_command_leads_where_the_table_says_or_is_refused(activity):
             assert (reply.code == "busy") <= activity.moving
 
 
-def test_the_table_has_one_answer_to_a_trigger():
+def test_each_trigger_has_one_target_per_activity():
     pairs = [(row.trigger, source) for row in TRANSITIONS for source in row.sources]
     assert len(pairs) == len(set(pairs))
 
 
-def test_power_off_stops_what_moves_before_the_power_goes():
+def test_power_off_stops_the_arm_before_cutting_power():
     robot = at(Activity.MOVING)
     assert robot.send(c.PowerOff) == Done()
     assert robot.tick().robot_mode == RobotMode.RUNNING
@@ -104,7 +104,7 @@ def test_power_off_stops_what_moves_before_the_power_goes():
 
 
 def longest_run(true) -> int:
-    """Of consecutive ticks."""
+    """Return the largest number of consecutive ticks."""
     longest = run = 0
     for each in true:
         run = run + 1 if each else 0
@@ -113,7 +113,7 @@ def longest_run(true) -> int:
 
 
 @pytest.mark.parametrize(("push", "stops"), [(-200.0, False), (-300.0, None), (-1000.0, True)])
-def test_a_push_is_a_protective_stop_only_when_a_drive_is_beyond_its_limit_for_long(push, stops):
+def test_only_a_lasting_torque_overload_causes_a_protective_stop(push, stops):
     robot = Robot()
     robot.tick(10)
     robot.send(SimulationInject, fault="torque", joint=1, value=push, seconds=0.004)
@@ -134,7 +134,7 @@ def test_a_push_is_a_protective_stop_only_when_a_drive_is_beyond_its_limit_for_l
 
 
 @pytest.mark.parametrize("activity", Activity)
-def test_an_arm_that_is_no_longer_finite_is_put_at_rest_and_the_robot_goes_on(activity):
+def test_a_non_finite_arm_is_placed_at_rest_and_can_be_used_again(activity):
     robot = at(activity)
     assert robot.send(SimulationInject, fault="nan") == Done()
     state = robot.tick()
@@ -156,7 +156,7 @@ def speeds(robot, since=0):
 
 
 @pytest.mark.parametrize(("shaper", "ticks"), [("none", 20), ("zv", 300), ("zv", 900)])
-def test_a_motion_is_slowed_on_its_way_and_hurried_again(shaper, ticks):
+def test_reduced_mode_slows_down_a_running_motion_temporarily(shaper, ticks):
     robot = Robot(shaper=shaper)
     robot.send(c.MoveJ, q=Q3_)
     robot.tick(ticks)
@@ -174,7 +174,7 @@ def test_a_motion_is_slowed_on_its_way_and_hurried_again(shaper, ticks):
     assert peak <= 2.0 * (1.02 if shaper == "zv" else 1.001)
 
 
-def test_a_new_motion_keeps_to_the_reduced_speed():
+def test_a_new_motion_keeps_the_reduced_speed():
     robot = Robot()
     robot.send(SimulationInject, fault="reduced")
     robot.send(c.MoveJ, q=Q3_)
@@ -184,7 +184,7 @@ def test_a_new_motion_keeps_to_the_reduced_speed():
     assert robot.tick().safety_mode == SafetyMode.NORMAL
 
 
-def test_a_stream_that_may_be_faster_is_stopped_and_not_started():
+def test_reduced_mode_stops_and_refuses_streams_that_are_too_fast():
     robot = at(Activity.STREAMING)
     robot.send(SimulationInject, fault="reduced")
     robot.until_rest()

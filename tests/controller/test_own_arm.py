@@ -1,4 +1,4 @@
-"""An arm that stands somewhere, has power, brakes and faults of its own, or a controller of its own."""
+"""A real arm: a given position, power, brakes and faults, or a controller of its own."""
 
 from dataclasses import replace
 
@@ -26,7 +26,7 @@ TARGET = tuple(np.add(STANDS, [0.3, -0.2, 0.2, 0.0, 0.1, 0.0]).tolist())
 
 
 def ready():
-    """A robot that has switched its arm on."""
+    """Return a robot whose arm is switched on."""
     plant = OwnArm(UR5E, UR5E.payload)
     robot = Robot(plant=plant)
     robot.tick(SWITCHES + 1)
@@ -54,18 +54,18 @@ def restart(robot):
 
 
 def moves(robot):
-    """It can move again, and arrives."""
+    """Check that the arm can move and arrives."""
     assert isinstance(robot.send(c.MoveJ, q=TARGET), Accepted)
     assert robot.until_rest().actual_q == pytest.approx(TARGET, abs=5e-4)
 
 
-def test_it_is_not_stepped_before_the_first_tick_and_the_line_begins_where_it_stands():
+def test_the_line_starts_at_the_measured_position_without_a_step():
     controller = Controller(setup(), OwnArm(UR5E, UR5E.payload))
     assert controller.setup.q == tuple(STANDS)
     assert controller.latest.actual_q == list(STANDS) == controller.latest.target_q
 
 
-def test_it_moves_once_its_drives_are_ready_and_not_before():
+def test_an_arm_moves_only_after_its_drives_are_ready():
     robot = Robot(plant=OwnArm(UR5E, UR5E.payload))
     robot.tick(SWITCHES // 2)
     refused = robot.send(c.MoveJ, q=TARGET)
@@ -74,7 +74,7 @@ def test_it_moves_once_its_drives_are_ready_and_not_before():
     moves(robot)
 
 
-def test_power_and_brakes_follow_the_robot_mode_and_it_goes_on_from_where_it_was_moved_to():
+def test_power_and_brakes_follow_the_robot_mode():
     plant, robot = ready()
     assert plant.calls == [(True, False)]
     assert robot.send(c.PowerOff) is not None
@@ -89,7 +89,7 @@ def test_power_and_brakes_follow_the_robot_mode_and_it_goes_on_from_where_it_was
     assert robot.states[-1].actual_q == pytest.approx(STANDS + 0.05, abs=5e-4)
 
 
-def test_a_fault_of_its_own_stops_it_until_the_fault_is_gone_and_safety_is_restarted():
+def test_a_fault_of_the_arm_stops_it_until_safety_is_restarted():
     plant, robot = ready()
     moving(robot)
     plant.fault = "joint 3 is too warm"
@@ -110,7 +110,7 @@ def test_a_fault_of_its_own_stops_it_until_the_fault_is_gone_and_safety_is_resta
     moves(robot)
 
 
-def test_one_that_does_not_answer_is_told_of_once():
+def test_an_arm_that_does_not_answer_is_reported_once():
     plant, robot = ready()
     moving(robot)
     plant.silent = True
@@ -127,7 +127,7 @@ def test_one_that_does_not_answer_is_told_of_once():
 
 
 @pytest.mark.parametrize("unknown", ["failing", "not finite"])
-def test_where_it_stands_may_be_unknown_until_it_answers_again(unknown):
+def test_power_on_is_refused_while_the_position_is_unknown(unknown):
     plant, robot = ready()
     moving(robot)
     plant.silent, plant.measure = True, fails if unknown == "failing" else lambda: not_finite(plant)
@@ -146,7 +146,7 @@ def test_where_it_stands_may_be_unknown_until_it_answers_again(unknown):
     moves(robot)
 
 
-def test_it_cannot_be_served_if_nobody_knows_where_it_stands():
+def test_an_arm_with_unknown_position_cannot_start():
     plant = OwnArm(UR5E, UR5E.payload)
     plant.measure = fails
     with pytest.raises(ValueError, match="where it stands is unknown: no answer"):
@@ -164,17 +164,17 @@ def not_finite(plant):
 
 
 @pytest.mark.parametrize("field", ["q", "moment"])
-def test_one_that_measures_what_is_no_number_stops_the_robot(field):
+def test_non_finite_measurements_stop_the_robot(field):
     plant, robot = ready()
     moving(robot)
     step = plant.step
     plant.step = lambda command: replace(step(command), **{field: np.full(6, np.nan)})
     robot.tick()
-    assert any("no number" in (event.why or "") for event in robot.events)
+    assert any("not finite numbers" in (event.why or "") for event in robot.events)
     assert modes(robot)[1] is SafetyMode.FAULT
 
 
-def test_measurements_whose_time_does_not_pass_are_no_measurements():
+def test_stale_measurements_stop_the_robot():
     plant, robot = ready()
     plant.measure, kept = (lambda: kept), plant.measure()
     robot.tick(STALE + 1)
@@ -182,7 +182,7 @@ def test_measurements_whose_time_does_not_pass_are_no_measurements():
     assert modes(robot)[1] is SafetyMode.FAULT
 
 
-def test_it_cannot_be_put_anywhere():
+def test_an_arm_without_reset_cannot_be_placed():
     _, robot = ready()
     before = robot.controller.latest
     refused = robot.send(SimulationReset, q=TARGET)
@@ -192,7 +192,7 @@ def test_it_cannot_be_put_anywhere():
 
 
 class Cut(OwnArm):
-    """An arm whose cable may be cut: each method then raises what no method of a plant should."""
+    """An arm with a cable that may be cut: its methods then raise exceptions that plants should not raise."""
 
     cut = ()
 
@@ -206,7 +206,7 @@ class Cut(OwnArm):
 
 
 def cut_off():
-    """A robot whose arm is switched on, and the arm."""
+    """Return such an arm, switched on, and its robot."""
     arms = []
     plant = OwnPlant("cut.py:Cut", "", lambda *given: arms.append(Cut(*given)) or arms[0])
     robot = Robot(plant=plant.make(UR5E, UR5E.payload))
@@ -217,7 +217,7 @@ def cut_off():
 @pytest.mark.parametrize(
     "names", [("step",), ("condition",), ("step", "condition", "switch", "measure", "stop")]
 )
-def test_whatever_a_method_of_somebody_s_own_arm_raises_stops_that_robot_alone_and_is_named(names):
+def test_an_exception_of_a_plant_method_stops_the_robot_and_is_reported(names):
     arm, robot = cut_off()
     moving(robot)
     arm.cut = names
@@ -234,7 +234,7 @@ def test_whatever_a_method_of_somebody_s_own_arm_raises_stops_that_robot_alone_a
     assert isinstance(robot.send(c.MoveJ, q=TARGET), Accepted)
 
 
-def test_a_simulated_arm_that_goes_on_failing_gets_no_power():
+def test_a_simulated_arm_that_keeps_failing_stays_without_power():
     plant = NoArm()
     robot = Robot(plant=plant)
     robot.tick(10)
@@ -251,8 +251,8 @@ def test_a_simulated_arm_that_goes_on_failing_gets_no_power():
 PUSH = {"fault": "torque", "joint": 1, "value": 40.0, "seconds": 0.1}
 
 
-def test_a_given_flexible_arm_is_the_default_to_the_last_bit():
-    """Whatever it carried before: the setup says what it carries."""
+def test_a_given_flexible_arm_equals_the_default_plant():
+    """The setup determines the payload, whatever the plant carried before."""
     given = FlexibleArm(UR5E, Payload())
     robots = Robot(seed=3), Robot(seed=3, plant=given)
     for robot in robots:
@@ -266,8 +266,8 @@ def test_a_given_flexible_arm_is_the_default_to_the_last_bit():
 
 
 @pytest.mark.parametrize("plant", [NoArm(), type("Own", (NoArm, Plant), {"payload": Payload()})()])
-def test_a_plant_of_ones_own_is_what_moves(plant):
-    """Where it is told to be: the reference, led by what the flexible arm's gears would twist."""
+def test_a_user_plant_follows_the_reference(plant):
+    """It follows the reference plus the lead for the twist of the flexible arm's gears."""
     robot = Robot(plant=plant)
     robot.send(c.MoveJ, q=tuple(Q2.tolist()))
     assert robot.until_rest().actual_q == pytest.approx(Q2, abs=1e-6)
@@ -275,14 +275,14 @@ def test_a_plant_of_ones_own_is_what_moves(plant):
 
 
 @pytest.mark.parametrize(("fields", "method"), [(PUSH, "push"), ({"fault": "nan"}, "make_nan")])
-def test_a_fault_that_the_plant_cannot_have_is_refused_by_name(fields, method):
+def test_faults_that_the_plant_cannot_simulate_are_refused(fields, method):
     refused = Robot(plant=NoArm()).send(SimulationInject, **fields)
     assert refused.code == "unknown_fault"
     assert "NoArm" in refused.why
     assert method in refused.why
 
 
-def test_truth_that_nobody_knows_is_refused_at_the_start():
+def test_truth_is_refused_for_a_plant_that_cannot_report_it():
     with pytest.raises(ValueError, match="NoArm cannot report it"):
         Controller(setup(truth=True), NoArm())
 
@@ -293,7 +293,7 @@ def test_truth_that_nobody_knows_is_refused_at_the_start():
     ("accelerometer", np.zeros(6), r"must be \(3,\)"),
     ("wrench", np.zeros(3), r"measured wrench has shape \(3,\): its shape must be \(6,\)"),
 ])  # fmt: skip
-def test_what_has_the_wrong_shape_is_refused_at_the_start(field, value, said):
+def test_measurements_of_wrong_shape_are_refused_at_start(field, value, said):
     class Wrong(NoArm):
         def step(self, command):
             parts = {"q": command.q, "qd": command.qd, "moment": command.q, "accelerometer": np.zeros(3)}
@@ -368,7 +368,6 @@ def robot(arm):
 
 
 def let_move(robot, arm):
-    """Let it move, for a while."""
     robot.send(c.MoveJ, q=[Q2[0] + 0.5, *Q2[1:]], velocity=0.5, acceleration=1.0, jerk=20.0)
     robot.tick(200)
     assert np.abs(arm.q - np.array(Q2)).max() > 0.01
@@ -383,7 +382,7 @@ def halted(robot, arm, safety):
 @pytest.mark.parametrize(
     "safety", [SafetyMode.NORMAL, SafetyMode.PROTECTIVE_STOP, SafetyMode.ROBOT_EMERGENCY_STOP]
 )
-def test_a_stop_of_its_controller_ends_motions_and_the_line_begins_again_where_it_stands(robot, arm, safety):
+def test_a_stop_by_the_arm_controller_ends_motions_and_restarts_the_line(robot, arm, safety):
     let_move(robot, arm)
     halted(robot, arm, safety)
     protective = safety == SafetyMode.PROTECTIVE_STOP
@@ -411,7 +410,7 @@ def test_a_stop_of_its_controller_ends_motions_and_the_line_begins_again_where_i
     assert stands == pytest.approx(arm.q, abs=1e-12)
 
 
-def test_a_lease_ends_while_its_controller_does_not_answer(arm, monkeypatch):
+def test_a_lease_expires_while_the_arm_controller_does_not_answer(arm, monkeypatch):
     robot = Robot(plant=arm, clock="realtime", lease_s=0.2)
     robot.tick(5)
 
@@ -424,7 +423,7 @@ def test_a_lease_ends_while_its_controller_does_not_answer(arm, monkeypatch):
     assert "lease_lost" in [event.kind for event in robot.events]
 
 
-def test_nothing_is_sent_while_its_controller_has_it(robot, arm):
+def test_no_set_points_are_sent_after_a_stop_by_the_arm_controller(robot, arm):
     let_move(robot, arm)
     halted(robot, arm, SafetyMode.PROTECTIVE_STOP)
     sent = len(arm.sent)
@@ -433,7 +432,7 @@ def test_nothing_is_sent_while_its_controller_has_it(robot, arm):
     assert not arm.holds
 
 
-def test_its_slider_scales_our_speed_and_leaves_what_was_set(robot, arm):
+def test_the_speed_slider_of_the_robot_scales_motions(robot, arm):
     robot.send(c.SetSpeed, fraction=0.5)
     arm.says(slider=0.4)
     robot.tick(2)
@@ -445,7 +444,7 @@ def test_its_slider_scales_our_speed_and_leaves_what_was_set(robot, arm):
 
 
 @pytest.mark.parametrize("said", [{"slider": np.nan}, {"slider": -1.0}, {"speed": np.inf}, {"tool": (1.0,)}])
-def test_what_no_robot_can_say_stops_it_and_names_the_field(arm, said):
+def test_impossible_reports_stop_the_robot_and_name_the_field(arm, said):
     robot = Robot(plant=called(arm, 6))
     robot.tick(5)
     let_move(robot, arm)
@@ -455,10 +454,14 @@ def test_what_no_robot_can_say_stops_it_and_names_the_field(arm, said):
     assert not arm.holds
 
 
-def test_what_it_would_not_get_is_refused(robot):
+def test_commands_that_would_not_reach_the_robot_are_refused(robot):
     for command, given, words in (
         (SetIo, {"digital_output_mask": 1, "digital_outputs": 1}, "only set-points are sent"),
-        (c.SetPayload, {"mass": 1.0, "com": (0.0, 0.0, 0.0), "inertia": (0.0,) * 6}, "tell it first"),
+        (
+            c.SetPayload,
+            {"mass": 1.0, "com": (0.0, 0.0, 0.0), "inertia": (0.0,) * 6},
+            "change it there first",
+        ),
         (c.SetShaper, {"name": "elastic"}, "takes positions only"),
     ):
         reply = robot.send(command, **given)
@@ -466,7 +469,7 @@ def test_what_it_would_not_get_is_refused(robot):
         assert words in reply.why
 
 
-def test_positions_are_sent_without_the_wind_up_that_its_own_drives_add(robot, arm):
+def test_positions_sent_to_a_real_arm_exclude_wind_up(robot, arm):
     let_move(robot, arm)
     targets = [state.target_q for state in robot.states if state.tick > 10]
     assert np.array(arm.sent[-150:]) == pytest.approx(np.array(targets[-150:]), abs=1e-12)

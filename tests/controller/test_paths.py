@@ -1,4 +1,4 @@
-"""Motions in space: lines, arcs and blends where an independent computation has them, shaped as unshaped."""
+"""Lines, arcs and blends match an independent computation, shaped and unshaped."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ from .robots import H
 
 
 def went(robot: Subject, kind, **fields) -> np.ndarray:
-    """The tool's positions in a motion, one for each tick, shape (k, 3)."""
+    """Return the tool's positions in a motion, one per tick, shape (k, 3)."""
     reply = robot.send(kind, **fields)
     assert isinstance(reply, Accepted), reply
     begun_at = len(robot.references) - 1
@@ -29,7 +29,7 @@ def speeds(positions) -> np.ndarray:
     return np.linalg.norm(np.diff(positions, axis=0), axis=1) / H
 
 
-def test_velocity_acceleration_and_jerk_are_those_of_the_tools_trapezoid():
+def test_move_l_uses_the_requested_velocity_acceleration_and_jerk():
     positions = went(begun(), MoveL, pose=away((0.1, 0.3, -0.1)), velocity=0.4, acceleration=1.5, jerk=50.0)
     s = np.concatenate([[0.0], np.cumsum(speeds(positions) * H)])
     derivatives = [np.abs(np.diff(s, order)).max() / H**order for order in (1, 2, 3)]
@@ -40,7 +40,7 @@ def test_velocity_acceleration_and_jerk_are_those_of_the_tools_trapezoid():
 
 
 @pytest.mark.parametrize(("kind", "duration"), [("line", 2.0), ("joints", 7.0), ("path", 0.8)])
-def test_a_duration_wins_over_velocity_and_acceleration(kind, duration):
+def test_a_duration_replaces_velocity_and_acceleration(kind, duration):
     robot = begun()
     line = LineSegment(pose=away((0.05, 0.1, 0.05)), duration=0.6 * duration, blend=0.03, velocity=0.01)
     then = LineSegment(pose=away((0.1, 0.1, 0.05)), duration=0.4 * duration, velocity=0.01)
@@ -52,7 +52,7 @@ def test_a_duration_wins_over_velocity_and_acceleration(kind, duration):
     assert (len(positions) - 2) * H == pytest.approx(duration, abs=4 * H)
 
 
-def test_a_process_keeps_its_speed_in_blends_and_a_line_slows_down_there():
+def test_process_segments_keep_their_speed_in_blends_unlike_lines():
     paths = {}
     for make in (ProcessSegment, LineSegment):
         corners = [(0.1, 0.0, 0.0), (0.1, 0.15, 0.0), (0.0, 0.15, 0.1)]
@@ -65,7 +65,7 @@ def test_a_process_keeps_its_speed_in_blends_and_a_line_slows_down_there():
     assert paths[LineSegment][away_from_ends].min() < 0.19
 
 
-def test_the_second_of_two_blends_that_overlap_is_skipped_and_the_arm_stops_there():
+def test_the_second_of_two_overlapping_blends_is_skipped():
     corners = [(0.1, 0.0, 0.0), (0.1, 0.1, 0.0), (0.0, 0.1, 0.1)]
     segments = tuple(LineSegment(pose=away(corner), blend=0.06) for corner in corners)
     robot = begun()
@@ -99,7 +99,7 @@ def test_joint_moves_blend_with_lines_inside_the_radius(way):
     )  # of joints on a joint part; a line may need more
 
 
-def test_a_path_that_goes_back_as_it_came_turns_inside_its_blend():
+def test_a_reversal_turns_inside_its_blend():
     segments = (LineSegment(pose=away((0.1, 0.0, 0.0)), blend=0.04), LineSegment(pose=away((0.0, 0.0, 0.0))))
     positions = went(begun(), MovePath, segments=segments) - tool_pose(BENT, NO_TOOL)[0]
     assert 0.06 < positions[:, 0].max() < 0.1
@@ -107,7 +107,7 @@ def test_a_path_that_goes_back_as_it_came_turns_inside_its_blend():
     assert np.abs(positions[-1]).max() < 1e-6
 
 
-def test_poses_are_given_in_a_frame():
+def test_poses_can_be_given_in_a_frame():
     frame = (0.3, -0.2, 0.1, 0.4, 0.5, -0.6)
     inside = Rotation.from_rotvec(frame[3:])
     goals = [away((0.1, 0.1, 0.0)), away((0.0, 0.2, 0.0), (0.1, 0.2, 0.3))]
@@ -128,7 +128,7 @@ def test_poses_are_given_in_a_frame():
         np.testing.assert_allclose(ends[0], ends[1], atol=1e-9)
 
 
-def test_a_joint_that_would_leave_its_range_is_named_with_the_share_of_the_way():
+def test_a_path_out_of_joint_range_is_refused_with_joint_and_progress():
     near_the_end = BENT.copy()
     near_the_end[5] = 6.2
     reply = begun(near_the_end).send(MoveL, pose=away((0.0, 0.0, 0.0), (0.0, 0.0, -1.0), q=near_the_end))
@@ -140,7 +140,7 @@ def test_a_joint_that_would_leave_its_range_is_named_with_the_share_of_the_way()
 
 
 def two_parts(shaper: str = "zv"):
-    """A robot that moves along a path that stops at its corner, and is about to come to rest there."""
+    """Return a robot on a path that stops at its corner, just before it rests there."""
     robot = begun(shaper=shaper)
     robot.send(
         MovePath, segments=tuple(LineSegment(pose=away(to)) for to in ((0.1, 0.0, 0.0), (0.1, 0.1, 0.0)))
@@ -152,7 +152,7 @@ def two_parts(shaper: str = "zv"):
 
 
 @pytest.mark.parametrize("again", [Pause, SimulationInject])
-def test_a_pause_between_two_parts_lasts_until_it_ends(again):
+def test_a_pause_between_two_parts_lasts_until_resume(again):
     """The first part is about to end, so it does; the pause then holds the arm at the corner."""
     robot = two_parts()
     robot.send(Pause)
@@ -168,7 +168,7 @@ def test_a_pause_between_two_parts_lasts_until_it_ends(again):
     assert [event.kind for event in robot.events][-1] == "motion_done"
 
 
-def test_a_payload_is_checked_on_the_parts_that_have_not_begun():
+def test_a_payload_change_is_checked_on_the_remaining_parts():
     robot = begun(shaper="none")
     position = tool_pose(BENT, (0.0,) * 6)[0]
     low = (0.0, 0.0, 0.2 - position[2])
@@ -184,7 +184,7 @@ def test_a_payload_is_checked_on_the_parts_that_have_not_begun():
 
 
 @pytest.mark.parametrize("kind", [MoveL, MoveJ])
-def test_a_motion_slow_by_its_duration_is_paused_at_once(kind):
+def test_a_very_slow_motion_is_paused_at_once(kind):
     robot = begun(shaper="zv")
     target = {"pose": away((0.05, 0.1, 0.0))} if kind is MoveL else {"q": tuple(BENT + 0.2)}
     assert isinstance(robot.send(kind, duration=300.0, **target), Accepted)

@@ -1,4 +1,4 @@
-"""Inputs, outputs, registers and the tool centre point: what is set is told, and nothing else changes."""
+"""Inputs, outputs, registers and tool centre point: settings are published, and nothing else changes."""
 
 import numpy as np
 import pinocchio as pin
@@ -27,7 +27,7 @@ def told(peripherals: Peripherals):
     return peripherals.io(1, paper_payload(UR5E), 1.0, {"program": None}, [0.0] * 6)
 
 
-def test_a_push_at_the_tool_is_told_in_io():
+def test_io_contains_the_external_force():
     robot = Robot()
     robot.tick(50)
     assert robot.controller.io().actual_TCP_force == pytest.approx([0.0] * 6, abs=1.0)
@@ -41,7 +41,7 @@ def test_a_push_at_the_tool_is_told_in_io():
 
 
 @given(st.lists(st.tuples(BITS18, BITS18), max_size=8))
-def test_a_mask_decides_which_digital_outputs_change(steps):
+def test_masks_select_the_digital_signals_that_change(steps):
     peripherals, bits = bare(), [False] * 18
     for mask, values in steps:
         peripherals.set_outputs(SetIo(token="", digital_output_mask=mask, digital_outputs=values))
@@ -53,7 +53,7 @@ def test_a_mask_decides_which_digital_outputs_change(steps):
 
 
 @given(st.integers(0, 3), st.integers(0, 3), st.floats(0, 1), st.floats(0, 1))
-def test_an_analog_output_is_a_share_of_its_range(mask, kind, first, second):
+def test_an_analog_output_is_a_fraction_of_its_range(mask, kind, first, second):
     peripherals, shares = bare(), (first, second)
     fields = {f"standard_analog_output_{number}": share for number, share in enumerate(shares)}
     masks = {"standard_analog_output_mask": mask, "standard_analog_output_type": kind}
@@ -73,7 +73,7 @@ def test_an_analog_output_is_a_share_of_its_range(mask, kind, first, second):
         st.tuples(st.integers(0, BITS - 1), st.lists(st.booleans(), min_size=1, max_size=40)), max_size=5
     ),
 )
-def test_bits_stand_in_words_of_32(bank, writes):
+def test_bit_registers_are_published_in_words_of_32(bank, writes):
     peripherals, bits = bare(), [False] * BITS
     for first, values in writes:
         fitting = values[: BITS - first]
@@ -86,7 +86,7 @@ def test_bits_stand_in_words_of_32(bank, writes):
     assert getattr(told(peripherals), f"{other}_register") == [0] * 4
 
 
-def test_it_is_told_once_for_each_tick_with_a_change():
+def test_io_is_published_once_per_tick_with_a_change():
     robot = Robot()
     assert robot.controller.changed_io().tick == 1  # as it begins
     robot.tick(3)
@@ -98,7 +98,7 @@ def test_it_is_told_once_for_each_tick_with_a_change():
     assert robot.controller.changed_io() is None
 
 
-def test_the_tool_centre_point_moves_the_pose_and_nothing_else():
+def test_a_tcp_changes_only_the_tool_pose():
     plain, tool = Robot(), Robot()
     offset = (0.03, -0.02, 0.15, 0.3, -0.2, 0.1)
     assert tool.send(SetTcp, offset=offset) == Done()
@@ -111,7 +111,7 @@ def test_the_tool_centre_point_moves_the_pose_and_nothing_else():
     assert np.allclose(placed.homogeneous, _placement(moved.actual_TCP_pose).homogeneous, atol=1e-12)
 
 
-def test_power_without_brakes_leaves_the_arm_idle():
+def test_power_on_without_brake_release_leaves_the_arm_idle():
     robot = Robot(mode="POWER_OFF")
     for release, mode in ((False, "IDLE"), (False, "IDLE"), (True, "RUNNING"), (False, "RUNNING")):
         assert robot.send(PowerOn, release_brakes=release) == Done()

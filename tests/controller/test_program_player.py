@@ -1,4 +1,4 @@
-"""Programs: the controller carries them out by itself, line by line, with the authority of whoever played them."""
+"""The controller carries out programs by itself, with the rights of the client that played them."""
 
 import pytest
 
@@ -11,8 +11,8 @@ from .robots import Q1, Q2, Q3, Robot
 
 ALL = [q.tolist() for q in (Q1, Q2, Q3, Q2, Q1)]
 """Where the program `paper.urp` goes."""
-LONG = 3000
-"""Ticks that are enough for a line."""
+LONG = 600
+"""Ticks in which a line would begin and a stop ends."""
 
 
 @pytest.fixture
@@ -43,17 +43,17 @@ def stopped(robot):
 
 
 def moves(robot):
-    """Beginnings and ends of motions."""
+    """Return starts and ends of motions."""
     return [event.kind for event in robot.events if event.kind.startswith("motion_")]
 
 
 def reached(robot):
-    """Where motions ended, by their targets."""
+    """Return the targets of completed motions."""
     ends = {event.tick for event in robot.events if event.kind == "motion_done"}
     return [pytest.approx(state.target_q, abs=1e-6) for state in robot.states if state.tick in ends]
 
 
-def test_a_program_makes_its_moves_in_order_each_in_the_tick_after_the_one_before_and_then_stops(robot):
+def test_a_program_makes_its_moves_in_order_without_gaps(robot):
     play(robot, "paper.urp")
     assert state(robot) == ("paper.urp", "PLAYING", 1)
     until(robot, stopped(robot))
@@ -64,7 +64,7 @@ def test_a_program_makes_its_moves_in_order_each_in_the_tick_after_the_one_befor
     assert started == [1, *(tick + 1 for tick in done[:-1])]
 
 
-def test_what_was_not_loaded_cannot_play_and_what_is_not_there_cannot_be_loaded(robot):
+def test_playing_without_a_program_and_loading_an_unknown_one_are_refused(robot):
     assert robot.send(ProgramPlay).code == "wrong_mode"
     refused = robot.send(ProgramLoad, name="nothing.urp")
     assert (refused.code, refused.where) == ("out_of_range", "name")
@@ -72,7 +72,7 @@ def test_what_was_not_loaded_cannot_play_and_what_is_not_there_cannot_be_loaded(
     assert state(robot) == (None, "STOPPED", 0)
 
 
-def test_loading_and_stopping_are_for_anyone_and_playing_and_pausing_are_not(robot):
+def test_playing_and_pausing_need_control_loading_and_stopping_do_not(robot):
     receive = robot.controller.receive
     assert receive(ProgramLoad(name="Q2.urp")) == Done()
     assert receive(ProgramPlay(token="x")).code == "stale_token"
@@ -92,9 +92,7 @@ def test_loading_and_stopping_are_for_anyone_and_playing_and_pausing_are_not(rob
     [(c.PowerOff, {}), (c.ReleaseControl, {}), (ProgramStop, {}), (SimulationReset, {"q": tuple(Q1)})]
     + [(SimulationInject, {"fault": fault}) for fault in ("emergency_stop", "violation")],
 )
-def test_what_ends_all_motions_ends_the_program_while_it_moves_and_while_it_waits(
-    robot, kind, fields, name, ticks
-):
+def test_commands_that_end_all_motions_end_the_program(robot, kind, fields, name, ticks):
     play(robot, name)
     robot.tick(ticks)
     assert state(robot)[1] == "PLAYING"
@@ -106,7 +104,7 @@ def test_what_ends_all_motions_ends_the_program_while_it_moves_and_while_it_wait
     assert started == ended
 
 
-def test_no_line_begins_after_a_stop_that_was_sent_before_it(robot):
+def test_no_line_starts_after_an_earlier_stop(robot):
     play(robot, "paper.urp")
     assert robot.controller.receive(c.Stop()) == Done()  # before the tick in which the first line would begin
     robot.tick(10)
@@ -120,7 +118,7 @@ def test_no_line_begins_after_a_stop_that_was_sent_before_it(robot):
 
 
 @pytest.mark.parametrize("fault", ["protective_stop", "nan"])
-def test_a_protective_stop_pauses_it_and_playing_goes_on_with_the_line_that_was_stopped(robot, fault):
+def test_a_program_resumes_the_interrupted_line_after_a_protective_stop(robot, fault):
     play(robot, "paper.urp")
     until(robot, lambda: len(reached(robot)) == 1)
     robot.tick(300)
@@ -137,7 +135,7 @@ def test_a_protective_stop_pauses_it_and_playing_goes_on_with_the_line_that_was_
     assert reached(robot) == ALL
 
 
-def test_pause_holds_the_motion_and_play_goes_on_with_it(robot):
+def test_pause_holds_the_motion_and_play_resumes_it(robot):
     play(robot, "Q2.urp")
     robot.tick(300)
     assert robot.send(ProgramPause) == Done()
@@ -153,7 +151,7 @@ def test_pause_holds_the_motion_and_play_goes_on_with_it(robot):
     assert reached(robot) == [Q2.tolist()]
 
 
-def test_a_safeguard_between_two_lines_has_the_next_one_wait(robot):
+def test_a_safeguard_stop_between_two_lines_delays_the_next_one(robot):
     play(robot, "paper.urp")
     until(robot, lambda: len(reached(robot)) == 1)
     robot.send(SimulationInject, fault="safeguard_stop")
@@ -184,7 +182,7 @@ end
 """
 
 
-def test_the_label_that_the_program_has_passed_is_told_with_its_line_until_it_ends(robot):
+def test_the_last_passed_label_is_published_with_the_line(robot):
     robot.send(ProgramLoad, name="p", text=LABELS)
     robot.send(ProgramPlay)
     seen = []

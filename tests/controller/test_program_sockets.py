@@ -1,4 +1,4 @@
-"""Sockets of programs: nothing that arrives is lost, and a time-out needs robot time and wall time."""
+"""Sockets of programs lose no data, and time-outs need robot time and wall time."""
 
 from struct import pack
 
@@ -15,7 +15,7 @@ OPENS = 'socket_open("10.0.0.2", 50001)'
 
 
 class Far:
-    """The other end of a program's sockets: `tell` brings news before the next tick, `take` all orders so far."""
+    """The other end of a program's sockets: `tell` brings news, `take` collects orders."""
 
     def __init__(self, robot):
         self._sockets, self.orders = robot.controller.programs.sockets, []
@@ -36,13 +36,13 @@ class Far:
         return b"".join(order.data for order in self.of(Send))
 
     def expire(self):
-        """Let the wall time of the waits pass that ask for it."""
+        """Let the wall time of the waits that ask for it pass."""
         for order in self.of(Expire):
             self.tell("expired", number=order.wait)
 
 
 def opened(*lines):
-    """A robot whose program has an open socket, and goes on with these lines."""
+    """Return a robot whose program has an open socket and continues with these lines."""
     robot = a_robot()
     far = Far(robot)
     start(robot, OPENS, *lines)
@@ -55,7 +55,7 @@ def ints(*values):
     return pack(f">{len(values)}i", *values)
 
 
-def test_a_program_connects_to_where_it_says_and_gets_the_answer():
+def test_socket_open_connects_and_returns_the_result():
     robot = a_robot()
     far = Far(robot)
     text = script('textmsg(socket_open("host.local", 30, "one"))', 'textmsg(socket_open("h", 7, "two"))')
@@ -73,7 +73,7 @@ def test_a_program_connects_to_where_it_says_and_gets_the_answer():
     assert {order.socket for order in far.of(Close)} == {1, 2}
 
 
-def test_who_plays_the_program_of_another_machine_does_not_lend_it_an_address():
+def test_a_program_played_by_another_machine_has_no_origin():
     robot = a_robot()
     far = Far(robot)
     text = script(OPENS)
@@ -100,7 +100,7 @@ def test_who_plays_the_program_of_another_machine_does_not_lend_it_an_address():
     ),
     st.data(),
 )
-def test_however_the_bytes_are_cut_each_message_is_read_whole_and_once(messages, data):
+def test_messages_are_read_once_and_whole_however_the_bytes_are_split(messages, data):
     lines, stream, expected = [], b"", []
     for message in messages:
         if isinstance(message, list):
@@ -123,7 +123,7 @@ def test_however_the_bytes_are_cut_each_message_is_read_whole_and_once(messages,
     assert sum(order.amount for order in far.of(Taken)) == size_of_all
 
 
-def test_a_read_ends_only_after_its_robot_time_and_its_wall_time():
+def test_a_read_times_out_only_after_robot_time_and_wall_time():
     robot, far = opened("textmsg(socket_read_binary_integer(2, timeout=0.02))")
     robot.tick(10)
     assert not far.of(Expire)  # the first tick opened the socket
@@ -137,7 +137,7 @@ def test_a_read_ends_only_after_its_robot_time_and_its_wall_time():
     assert said(robot) == ["[0, -1, -1]"]
 
 
-def test_what_arrives_before_the_wall_time_is_over_counts_and_a_part_stays_for_the_next_read():
+def test_incomplete_data_stays_for_the_next_read():
     robot, far = opened(*["textmsg(socket_read_binary_integer(2, timeout=0.02))"] * 3)
     robot.tick(20)
     far.tell("received", ints(7, 8) + b"\0\0")
@@ -149,7 +149,7 @@ def test_what_arrives_before_the_wall_time_is_over_counts_and_a_part_stays_for_t
     assert said(robot) == ["[2, 7, 8]", "[0, -1, -1]", "[2, 5, 6]"]
 
 
-def test_a_socket_that_is_closed_from_outside_gives_what_it_has_received_and_then_failures_that_take_time():
+def test_a_socket_closed_remotely_returns_received_data_then_failures():
     read = "socket_read_binary_integer(1, timeout=0)"
     robot, far = opened(f"textmsg({read})", "i = 0", f"while i < 100:\n if {read}[0] <= 0:\n i = i + 1\n end\n end",
                         'textmsg(socket_send_string("x"))')  # fmt: skip
@@ -163,7 +163,7 @@ def test_a_socket_that_is_closed_from_outside_gives_what_it_has_received_and_the
     assert failure(robot) is None
 
 
-def test_a_client_that_sends_more_than_a_program_reads_in_a_tick_is_no_endless_loop():
+def test_a_flood_of_received_data_does_not_block_a_tick():
     robot, far = opened("while True:", "  socket_read_binary_integer(1, timeout=0)", "end")
     for _ in range(200):
         far.tell("received", bytes(4000))
@@ -182,7 +182,7 @@ SENDS = {
 }
 
 
-def test_what_is_sent():
+def test_send_functions_send_the_expected_bytes():
     robot, far = opened(*SENDS)
     finish(robot)
     assert [order.data for order in far.of(Send)] == [*SENDS.values()]
@@ -201,7 +201,7 @@ def test_what_is_sent():
     ('socket_get_var("POS")', b"VEL 12\n", "0"),
     ('socket_get_var("POS")', b"\r\n\nPOS 12\n", "12"),
 ])  # fmt: skip
-def test_what_is_read(call, received, value):
+def test_read_functions_parse_received_bytes(call, received, value):
     robot, far = opened(f"textmsg({call})")
     far.tell("received", received)
     robot.tick(3)
@@ -209,7 +209,7 @@ def test_what_is_read(call, received, value):
     assert far.sent == (b"GET POS\n" if "get_var" in call else b"")
 
 
-def test_a_program_has_so_many_sockets_and_no_more():
+def test_the_number_of_open_sockets_is_limited():
     robot = a_robot()
     far = Far(robot)
     start(robot, "i = 0", "while True:", '  socket_open("h", 1, to_str(i))', "  i = i + 1", "end")
@@ -221,7 +221,7 @@ def test_a_program_has_so_many_sockets_and_no_more():
     assert len(far.of(Close)) == 16
 
 
-def test_the_end_of_a_program_closes_its_sockets_at_once():
+def test_the_end_of_a_program_closes_its_sockets():
     robot, far = opened("socket_read_line(timeout=0)")
     robot.tick(5)
     robot.send(ProgramStop)
@@ -249,7 +249,7 @@ def motions(robot):
     return robot.kinds().count("motion_started")
 
 
-def test_moves_whose_targets_have_arrived_are_one_path_and_what_is_sent_between_waits_for_the_blends():
+def test_received_moves_are_one_path_and_sends_between_them_wait_for_the_blends():
     robot, far = opened(*MOVES)
     far.tell("received", ints(1, 1, 1))
     robot.tick(5)
@@ -280,7 +280,7 @@ CALLS = st.lists(
 
 @settings(max_examples=60, deadline=None)
 @given(CALLS, CALLS, STEPS)
-def test_whatever_happens_the_network_is_asked_only_for_what_it_can_do(calls, beside, steps):
+def test_socket_orders_are_consistent_for_random_programs(calls, beside, steps):
     robot = a_robot()
     far = Far(robot)
     start(robot, "thread beside():", *beside, "end", "while True:", *calls, "sync()", "end")
@@ -302,7 +302,7 @@ def test_whatever_happens_the_network_is_asked_only_for_what_it_can_do(calls, be
 
 
 def left_open(orders):
-    """Sockets and waits that orders leave behind, which fit each other."""
+    """Return the sockets and waits that remain after consistent orders."""
     live, waits = set(), set()
     for order in orders:
         match order:

@@ -1,4 +1,4 @@
-"""Programs in URScript move the arm, read and write what clients see, and end as UR's controllers end them."""
+"""Programs in URScript move the arm, read and write what clients see, and end as on UR's controllers."""
 
 from itertools import pairwise
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tvist_controller.kinematics.arm import Arm
-from tvist_controller.paths.poses import placement_vector
+from tvist_controller.kinematics.pose import placement_vector
 from tvist_protocol import commands as c
 from tvist_protocol.io import SetRegisters
 from tvist_protocol.motions import MoveL
@@ -24,32 +24,32 @@ NEAR = [angle + 0.2 for angle in URSIM]
 
 
 def ended(robot):
-    """Why each program has ended, None for those that ended by themselves."""
+    """Return why each program has ended, None for those that ended by themselves."""
     return [event.why for event in robot.events if event.kind == "program_stopped"]
 
 
 def told(robot):
-    """Ticks in which programs wrote a text."""
+    """Return the ticks in which programs wrote a text."""
     return [event.tick for event in robot.events if event.kind == "text"]
 
 
 def pose(dx=0.0, dy=0.0, dz=0.0):
-    """A pose beside the one at the start, as text."""
+    """Return a pose near the start, as text."""
     x, y, z, *turn = HERE
     return f"p{[x + dx, y + dy, z + dz, *turn]}"
 
 
 def place(dx, dy, dz):
-    """A place beside the one at the start [m]."""
+    """Return a position near the start [m]."""
     return np.array([HERE[0] + dx, HERE[1] + dy, HERE[2] + dz])
 
 
 def places(robot):
-    """Positions of the tool before shaping, one a tick [m]."""
+    """Return the tool's positions before shaping, one per tick [m]."""
     return np.array([KINEMATICS.pose(np.array(state.reference_q))[1] for state in robot.states])
 
 
-def test_a_movej_is_the_motion_of_the_command_to_the_last_bit():
+def test_movej_is_bit_equal_to_the_command_move_j():
     one, other = a_robot(shaper="zv"), a_robot(shaper="zv")
     run(one, f"movej({NEAR}, a=1.5, v=0.9)")
     other.send(c.MoveJ, q=tuple(NEAR), acceleration=1.5, velocity=0.9)
@@ -57,7 +57,7 @@ def test_a_movej_is_the_motion_of_the_command_to_the_last_bit():
     assert [state.target_q for state in one.states] == [state.target_q for state in other.states]
 
 
-def test_a_movel_is_the_line_of_the_command_and_begins_a_fixed_time_later():
+def test_movel_equals_the_command_move_l_after_a_fixed_delay():
     one, other = a_robot(), a_robot()
     run(one, f"movel({pose(dy=0.1)}, a=1.0, v=0.2)")
     x, y, z, *turn = HERE
@@ -69,7 +69,7 @@ def test_a_movel_is_the_line_of_the_command_and_begins_a_fixed_time_later():
     assert moved == [state.target_q for state in other.states[: len(moved)]]
 
 
-def test_statements_after_a_move_run_when_the_shaped_reference_is_at_rest():
+def test_statements_after_a_move_run_when_the_shaped_reference_rests():
     robot = a_robot(shaper="zv")
     run(robot, f"movej({NEAR})", "textmsg(norm(get_target_joint_speeds()))")
     done = next(event.tick for event in robot.events if event.kind == "motion_done")
@@ -78,7 +78,7 @@ def test_statements_after_a_move_run_when_the_shaped_reference_is_at_rest():
     assert float(said(robot)[0]) < 1e-4
 
 
-def test_a_movej_to_a_pose_ends_there_near_the_present_joints():
+def test_movej_to_a_pose_uses_the_nearest_joint_positions():
     robot = a_robot()
     run(robot, f"movej({pose(dz=0.05)})")
     np.testing.assert_allclose(places(robot)[-1], place(0, 0, 0.05), atol=1e-6)
@@ -100,11 +100,11 @@ FORCE = "force_mode(p[0,0,0,0,0,0], {}, [0,0,1,0,0,0], {}, {})"
     ("movel(p[1e8, 0, 0, 0, 0, 0])", "pose[0] is 1e+08: it must be from -1000 to 1000"),
     ("movec(get_target_tcp_pose(), p[0, -1e8, 0, 0, 0, 0])", "pose_to[1] is -1e+08"),
     ("set_tcp(p[1e160, 0, 0, 0, 0, 0])", "tcp[0] is 1e+160: it must be from -10 to 10"),
-    ("set_payload(99)", "rated for 5"),
+    ("set_payload(99)", "at most 5 kg, the arm's rating"),
     ("set_payload(1e300)", "m is 1e+300: it must be from 0 to 100"),
     ("set_target_payload(1, [0, 0, 3])", "cog[2] is 3: it must be from -2 to 2"),
-    ("set_target_payload(1, [0, 0, .05], [.001, .001, .0022, 0, 0, 0])", "no body has these moments of inertia"),
-    ("set_target_payload(1, [0, 0, .05], [1, 1, 1, 3, 0, 0])", "no body has these moments of inertia"),
+    ("set_target_payload(1, [0, 0, .05], [.001, .001, .0022, 0, 0, 0])", "the moments of inertia of a real body"),
+    ("set_target_payload(1, [0, 0, .05], [1, 1, 1, 3, 0, 0])", "the moments of inertia of a real body"),
     ("set_gravity([0, 9.82, 0])", "stands upright"),
     ("get_inverse_kin(p[10,0,0,0,0,0])", "no joint positions reach"),
     ("get_actual_joint_positions_history(5000)", "steps is 5000"),
@@ -121,19 +121,32 @@ FORCE = "force_mode(p[0,0,0,0,0,0], {}, [0,0,1,0,0,0], {}, {})"
     ("socket_read_binary_integer(31)", "number is 31"),
     ("socket_send_int(2147483648)", "value is"),
     ("direct_torque([0, 0, 0, 0, 0, 0])", "does not simulate torque control"),
+    ("set_tool_analog_input_domain(2, 0)", "port is 2: it must be from 0 to 1"),
+    ("set_tool_output_mode(2)", "mode is 2: it must be from 0 to 1"),
+    ("set_tool_communication(True, 9601, 0, 1, 1.5, 3.5)", "baud_rate is 9601: it must be one of 9600"),
+    ("set_tool_communication(True, 9600, 0, 1, 0.5, 3.5)", "rx_idle_chars is 0.5: it must be from 1 to 40"),
+    ('set_gp_boolean_input_action(128, "default")', "port is 128: it must be from 0 to 127"),
+    ('set_standard_digital_input_action(0, "stop")', 'action is stop: it must be "default" or "freedrive"'),
+    ("jerk_gain_scaling_set(0)", "gain is 0: it must be from 0.01 to 1"),
+    ("set_base_acceleration([0.1, 0, 0])", "the simulated arm's base stands"),
+    ("set_runstate_tool_digital_output_to_value(2, 1)", "outputId is 2: it must be from 0 to 1"),
+    ("set_runstate_standard_digital_output_to_value(0, 6)", "whether the arm has power are not simulated"),
+    ("time(2)", "mode is 2; this controller has no clock of the day"),
+    ('modbus_add_signal("1.2.3.4", 255, 0, 0, "x", True)', "does not simulate Modbus"),
+    ("x = struct(a=1)\nx.go(1)", "go: this controller does not simulate remote procedure calls and Ethernet/IP"),
 ])  # fmt: skip
-def test_what_cannot_be_done_ends_the_program_at_its_call_and_the_arm_stays(call, why):
+def test_invalid_arguments_end_the_program_at_their_call(call, why):
     robot = a_robot()
     run(robot, "textmsg(1)", call, "textmsg(2)")
     error = failure(robot)
     assert why in error.why
-    assert (error.line, error.column, error.program) == (3, 3, "prog")
+    assert (error.line, error.column, error.program) == (3 + call.count("\n"), 3, "prog")
     assert said(robot) == ["1"]
     assert all(state.reference_q == list(URSIM) for state in robot.states)
 
 
 @pytest.mark.parametrize("target", ["p[10,0,0,0,0,0]", pose(dz=-0.8)])
-def test_a_line_that_the_arm_cannot_follow_ends_in_a_protective_stop_that_can_be_unlocked(target):
+def test_an_impossible_line_causes_a_protective_stop_that_can_be_unlocked(target):
     robot = a_robot()
     run(robot, f"movel({target})", "textmsg(1)")
     assert robot.controller.programs.state == "PAUSED"
@@ -144,7 +157,7 @@ def test_a_line_that_the_arm_cannot_follow_ends_in_a_protective_stop_that_can_be
     np.testing.assert_allclose(robot.states[-1].reference_q, NEAR, atol=1e-9)
 
 
-def test_moves_with_a_radius_are_one_motion_and_what_comes_between_happens_in_the_blend():
+def test_effects_between_blended_moves_happen_in_the_blend():
     robot, radius = a_robot(), 0.03
     run(robot, f"movel({pose(dy=0.12)}, a=0.8, v=0.2, r={radius})", "write_output_integer_register(0, 1)",
         'textmsg("corner")', f"movel({pose(dy=0.12, dz=0.12)}, a=0.8, v=0.2)", 'textmsg("end")')  # fmt: skip
@@ -156,7 +169,7 @@ def test_moves_with_a_radius_are_one_motion_and_what_comes_between_happens_in_th
     assert end == next(event.tick for event in robot.events if event.kind == "motion_done") + 1
 
 
-def test_servoj_follows_and_the_end_of_its_thread_stops_the_arm():
+def test_the_end_of_a_servoj_thread_stops_the_arm():
     robot = a_robot()
     aim = [angle + 0.05 for angle in URSIM]
     servo = f"while True:\n servoj({aim}, t=0.002, lookahead_time=0.03, gain=1200)\n end"
@@ -169,7 +182,7 @@ def test_servoj_follows_and_the_end_of_its_thread_stops_the_arm():
     assert failure(robot) is None
 
 
-def test_a_thread_killed_in_a_move_leaves_it_to_the_stop_that_follows():
+def test_stopj_stops_the_move_of_a_killed_thread():
     robot = a_robot()
     run(robot, f"thread go():\n movej({[URSIM[0] + 1.0, *URSIM[1:]]}, a=2, v=1)\n end", "handle = run go()",
         "sleep(0.4)", "kill handle", "stopj(1.0)", "textmsg(norm(get_target_joint_speeds()))")  # fmt: skip
@@ -186,7 +199,7 @@ def test_two_threads_cannot_move_the_arm_at_once():
     assert robot.until_rest()
 
 
-def test_speedj_returns_after_its_time_and_keeps_the_speed_until_the_program_ends():
+def test_speedj_returns_after_its_time_and_keeps_the_speed():
     robot = a_robot()
     run(robot, "speedj([0.1, 0, 0, 0, 0, 0], 1, 0.3)", "textmsg(get_target_joint_speeds()[0])", "sleep(0.2)")
     assert float(said(robot)[0]) == pytest.approx(0.1, abs=1e-6)
@@ -195,7 +208,7 @@ def test_speedj_returns_after_its_time_and_keeps_the_speed_until_the_program_end
     robot.until_rest()
 
 
-def test_registers_that_a_program_writes_are_published_with_the_tick_in_which_it_does():
+def test_written_registers_are_published_in_the_same_tick():
     robot = a_robot()
     start(robot, "sleep(0.01)", "write_output_float_register(3, 1.5)", "sleep(1)")
     told = []
@@ -208,7 +221,7 @@ def test_registers_that_a_program_writes_are_published_with_the_tick_in_which_it
     assert told[-1] == (6, 1.5)
 
 
-def test_a_program_follows_the_registers_that_a_client_writes():
+def test_a_program_reads_registers_written_by_a_client():
     robot = a_robot()
     start(robot, "while read_input_integer_register(24) == 0:", "  sync()", "end",
           "textmsg(read_input_float_register(47))", "textmsg(read_input_boolean_register(64))")  # fmt: skip
@@ -220,7 +233,7 @@ def test_a_program_follows_the_registers_that_a_client_writes():
     assert said(robot) == ["2.5", "True"]
 
 
-def test_outputs_read_back():
+def test_outputs_can_be_read_back():
     robot = a_robot()
     run(robot, "set_standard_digital_out(3, True)", "set_tool_digital_out(1, True)", "digital_out[0] = True",
         "set_analog_outputdomain(1, 1)", "set_standard_analog_out(1, 0.25)", "set_tool_voltage(24)",
@@ -232,7 +245,7 @@ def test_outputs_read_back():
     assert said(robot) == ["True", "0.25"]
 
 
-def test_a_blocking_popup_waits_until_somebody_closes_it():
+def test_a_blocking_popup_waits_until_it_is_closed():
     robot = a_robot()
     start(robot, 'popup("look", title="T", warning=True, blocking=True)', "textmsg(1)")
     robot.tick(100)
@@ -245,7 +258,7 @@ def test_a_blocking_popup_waits_until_somebody_closes_it():
 
 
 @pytest.mark.parametrize(("action", "state"), [("pause", "PAUSED"), ("stop", "STOPPED")])
-def test_a_watchdog_pauses_or_stops_the_program_when_its_register_is_not_written(action, state):
+def test_a_watchdog_pauses_or_stops_the_program_without_register_writes(action, state):
     robot, watchdog = a_robot(), f'rtde_set_watchdog("input_int_register_0", 10.0, "{action}")'
     start(robot, watchdog, "speedj([0.1,0,0,0,0,0], 1, 9)")
     for _ in range(10):
@@ -260,7 +273,7 @@ def test_a_watchdog_pauses_or_stops_the_program_when_its_register_is_not_written
 
 
 @pytest.mark.parametrize("seconds", [0.0, 0.1, 1.0])
-def test_what_is_published_goes_over_to_another_payload_in_the_time_that_a_program_says(seconds):
+def test_the_published_payload_changes_within_the_transition_time(seconds):
     robot = a_robot(payload=Payload(mass=2.0, com=(0.0, 0.0, 0.01), inertia=(0.0,) * 6))
     start(robot, f"set_target_payload(1, [0.02, 0, 0.05], [0, 0, 0, 0, 0, 0], {seconds})", "sleep(2)")
     masses = []
@@ -277,7 +290,7 @@ def test_what_is_published_goes_over_to_another_payload_in_the_time_that_a_progr
     assert (masses[0], masses[-1]) == (2.0, 1.0)
 
 
-def test_secondary_programs_run_beside_the_main_one_and_do_not_move_the_arm():
+def test_secondary_programs_run_beside_the_main_one_without_moves():
     robot = a_robot()
     start(robot, "sleep(0.1)", "textmsg(2)")
     robot.tick(2)
@@ -304,7 +317,7 @@ def test_halt_ends_all_programs_and_the_motion(main, extra):
     assert robot.controller.peripherals.read("output_int", 3) == last
 
 
-def test_a_new_program_replaces_the_one_that_runs_and_waits_until_the_arm_rests():
+def test_a_new_program_replaces_the_running_one_and_waits_for_rest():
     robot = a_robot()
     start(robot, "speedj([0.5,0,0,0,0,0], 2, 9)", name="one")
     robot.tick(300)
@@ -316,7 +329,7 @@ def test_a_new_program_replaces_the_one_that_runs_and_waits_until_the_arm_rests(
     assert (np.abs(np.diff(robot.column("target_qd"), axis=0)) / 0.002).max() < 40.0
 
 
-def test_the_slider_stretches_the_time_of_speedj_and_not_that_of_sleep():
+def test_the_speed_slider_stretches_speedj_but_not_sleep():
     robot = a_robot()
     robot.send(c.SetSpeed, fraction=0.5)
     run(robot, "speedj([0.1,0,0,0,0,0], 1.0, 0.2)", "textmsg(1)", "sleep(0.2)", "textmsg(2)", "stopj(5)")
@@ -325,7 +338,7 @@ def test_the_slider_stretches_the_time_of_speedj_and_not_that_of_sleep():
     assert second - first == 100
 
 
-def test_the_end_of_a_program_says_why_unless_it_is_its_own():
+def test_the_end_of_a_program_has_a_reason_unless_it_finished():
     robot = a_robot()
     run(robot, "sleep(0.1)")
     assert ended(robot) == [None]
@@ -341,7 +354,7 @@ def test_the_end_of_a_program_says_why_unless_it_is_its_own():
     assert failure(robot) is None
 
 
-def test_a_servoj_to_where_the_arm_rests_is_no_motion():
+def test_servoj_to_the_present_position_starts_no_motion():
     """Clients that hold a posture repeat it 500 times a second."""
     robot = run(a_robot(), "q = get_target_joint_positions()", *["servoj(q)"] * 50)
     assert robot.kinds().count("motion_started") == 0
@@ -351,7 +364,7 @@ def test_a_servoj_to_where_the_arm_rests_is_no_motion():
 
 
 @pytest.mark.parametrize(("zz", "found"), [("0.00205", [0.00105, 0.00105, 0.0021]), ("0.002", None)])
-def test_an_inertia_that_was_rounded_becomes_that_of_a_body_with_a_warning(zz, found):
+def test_a_rounded_inertia_is_corrected_with_a_warning(zz, found):
     robot = run(a_robot(), f"set_target_payload(1.0, [0, 0, 0.05], [0.001, 0.001, {zz}, 0, 0, 0])")
     assert failure(robot) is None
     kept = robot.controller.declared.inertia
@@ -386,7 +399,7 @@ def warned(line, **changes):
         TURN.format(to=0.2, how="v=9, t=0.5"),  # the speed does not count
     ],
 )
-def test_what_is_reached_or_ends_too_soon_is_not_told(line):
+def test_reached_or_short_moves_cause_no_limit_warning(line):
     assert warned(line) == []
 
 
@@ -404,7 +417,7 @@ def test_what_is_reached_or_ends_too_soon_is_not_told(line):
         (TURN.format(to=0.5, how="t=0.1"), "limit_acceleration", ["duration is 0.", "instead of 0.1"]),
     ],
 )
-def test_what_a_limit_lowers_is_told_with_both_numbers(line, code, words):
+def test_a_lowered_speed_is_reported_with_both_values(line, code, words):
     ((found, why),) = warned(line)
     assert found == code
     assert all(word in why for word in words), why
@@ -415,7 +428,7 @@ LINE = f"movel({pose(dy=0.1)}, a=1.0, v=0.2)"
 
 @pytest.mark.parametrize("ticks", [1, 5, 9])
 def test_a_client_may_move_the_arm_while_a_line_is_planned(ticks):
-    """The program stops that motion first, as it does with one that goes on when a move is called."""
+    """The program stops the client's motion first, as it does if one continues when a move is called."""
     robot = a_robot()
     start(robot, LINE, "textmsg(1)")
     robot.tick(ticks)
@@ -429,7 +442,7 @@ def test_a_client_may_move_the_arm_while_a_line_is_planned(ticks):
     np.testing.assert_allclose(places(robot)[-1], place(0, 0.1, 0), atol=1e-6)
 
 
-def test_servoc_that_was_paused_and_goes_on_can_be_paused_again():
+def test_a_resumed_servoc_can_be_paused_again():
     robot = a_robot()
     start(robot, f"servoc({pose(dy=0.1)}, a=1.0, v=0.05)", "textmsg(1)")
     robot.tick(200)
@@ -448,8 +461,8 @@ def test_servoc_that_was_paused_and_goes_on_can_be_paused_again():
 
 
 @pytest.mark.parametrize("move", [f"movej({NEAR})", LINE, "speedj([0.1, 0, 0, 0, 0, 0], 1, 0.2)", "sync()"])
-def test_protective_stop_pauses_the_program_at_any_next_statement_that_waits(move):
-    """Also at a move in the same tick, which is carried out when the program is played again."""
+def test_protective_stop_pauses_the_program_at_the_next_waiting_statement(move):
+    """Also at a move in the same tick, which is carried out after the program is played again."""
     robot = a_robot()
     start(robot, "protective_stop()", move, "textmsg(1)")
     robot.tick(20)
@@ -472,7 +485,7 @@ GUIDED = (
 
 
 @pytest.mark.parametrize("move", GUIDED)
-def test_a_guided_motion_waits_until_the_program_before_has_come_to_rest(move):
+def test_a_guided_motion_waits_for_the_stop_of_the_previous_program(move):
     robot = a_robot()
     start(robot, "speedj([0.5, 0, 0, 0, 0, 0], 2, 9)")
     robot.tick(200)
@@ -486,14 +499,14 @@ BUSY = "thread guide():", "  while True:", "    speedj([0.2, 0, 0, 0, 0, 0], 4, 
 
 
 def guiding(work):
-    """A robot whose program guides the arm by a thread that works for a while after each of its commands."""
+    """Return a robot guided by a thread that computes for a while after each command."""
     robot = a_robot()
     text = script(*BUSY, "handle = run guide()", "while True:", "  sync()", "end").format(work)
     robot.send(ProgramRun, text=text)
     return robot
 
 
-def test_a_thread_that_misses_turns_is_named_once():
+def test_a_thread_that_misses_turns_is_reported_once():
     robot = guiding("    i = 0\n    while i < 1100:\n      i = i + 1\n    end")
     robot.tick(200)
     (warning,) = [event.why for event in robot.events if event.kind == "warning"]
@@ -502,7 +515,7 @@ def test_a_thread_that_misses_turns_is_named_once():
     assert robot.states[-1].target_qd[0] == pytest.approx(0.2)
 
 
-def test_the_arm_comes_to_rest_while_the_thread_that_guides_it_computes_and_goes_on_afterwards():
+def test_the_arm_slows_down_while_its_guiding_thread_computes():
     robot = guiding("    i = 0\n    while i < 200000:\n      i = i + 1\n    end")
     speeds = []
     for _ in range(1000):
@@ -527,7 +540,7 @@ LAST = {
 
 
 @pytest.mark.parametrize("lines", LAST.values(), ids=LAST)
-def test_a_program_ends_with_a_protective_stop_that_nothing_follows(lines):
+def test_a_final_protective_stop_ends_the_program(lines):
     robot = a_robot()
     start(robot, *lines)
     finish(robot)
@@ -536,7 +549,7 @@ def test_a_program_ends_with_a_protective_stop_that_nothing_follows(lines):
 
 
 @pytest.mark.parametrize("follows", ["x = 1", 'popup("a", blocking=True)', "sync()"])
-def test_it_is_paused_where_something_follows(follows):
+def test_a_protective_stop_followed_by_statements_pauses_the_program(follows):
     for lines in (("protective_stop()", follows), (STOPS, "handle = run t()", "join handle", follows)):
         robot = a_robot()
         start(robot, *lines)

@@ -1,4 +1,4 @@
-"""What is refused: each command's content once, through the door that clients use, by code, field and limit."""
+"""Refused commands: the content of each, once, as clients send them; code, field and limit."""
 
 import math
 
@@ -41,7 +41,7 @@ def moving(robot):
 
 
 def assert_unchanged(robot: Robot, twin: Robot, ticks: int = 50) -> None:
-    """The next states and events are, bit for bit, those of one that did not get the command."""
+    """Check that the next states and events equal, bit for bit, those of a robot without the command."""
     for each in (robot, twin):
         each.states.clear()
         each.events.clear()
@@ -58,7 +58,7 @@ def encoded_io(robot):
 
 
 def alike(begin, **changes):
-    """A robot and its twin, both of which do the same."""
+    """Return a robot and its twin, which do the same."""
     robots = [Robot(**changes) for _ in range(2)]
     for each in robots:
         begin(each)
@@ -74,7 +74,7 @@ def polynomial(calibration):
 
 
 def deep(change):
-    """A calibration with a fault deep inside."""
+    """Return a calibration with a fault deep inside."""
     found = content()
     return polynomial(found | {"polynomial": found["polynomial"] | change})
 
@@ -90,27 +90,22 @@ def path(*segments):
 COEFFICIENTS = POLYNOMIAL["f_d_coefficients"]
 TOO_MANY = Registers(bank="input_double", first=47, values=(1.0, 2.0))
 NO_BIT = Registers(bank="input_bit", values=(2,))
+INT, MOST = {"bank": "input_int"}, UR5E.limits
 FIXED = {"name": "fixed", "f_d": (8.0,), "zeta": (0.2,)}
 WRONG = [  # command, content, code and field; the limit told, or words that help
     (c.TakeControl, {"client": "b"}, "no_control", "token"),
     (c.TakeControl, {"client": "a", "protocol": 2}, "unsupported_version", "protocol"),
     (c.MoveJ, {"q": Q2_[:5]}, "out_of_range", "q", 6),
     (c.MoveJ, {"q": (*Q2_, 0.0)}, "out_of_range", "q"),
-    (c.MoveJ, {"q": (7.0, *Q2_[1:])}, "limit_position", "q[0]", UR5E.limits.position[0]),
+    (c.MoveJ, {"q": (7.0, *Q2_[1:])}, "limit_position", "q[0]", MOST.position[0]),
     (c.MoveJ, {"q": (*Q2_[:5], -math.inf)}, "limit_position", "q[5]"),
     (c.MoveJ, {"q": (*Q2_[:5], NAN)}, "limit_position", "q[5]"),
-    (c.MoveJ, {"q": Q2_, "velocity": 4.0}, "limit_velocity", "velocity", UR5E.limits.velocity[0]),
+    (c.MoveJ, {"q": Q2_, "velocity": 4.0}, "limit_velocity", "velocity", MOST.velocity[0]),
     (c.MoveJ, {"q": Q2_, "velocity": 1e-4}, "out_of_range", "velocity"),
     (c.MoveJ, {"q": (6.28, *Q2_[1:]), "velocity": 5e-324}, "out_of_range", "velocity"),
-    (
-        c.MoveJ,
-        {"q": Q2_, "acceleration": 41.0},
-        "limit_acceleration",
-        "acceleration",
-        UR5E.limits.acceleration[0],
-    ),
+    (c.MoveJ, {"q": Q2_, "acceleration": 41.0}, "limit_acceleration", "acceleration", MOST.acceleration[0]),
     (c.MoveJ, {"q": Q2_, "acceleration": 5e-324}, "out_of_range", "acceleration"),
-    (c.MoveJ, {"q": Q2_, "jerk": 3000.0}, "out_of_range", "jerk", UR5E.limits.jerk[0]),
+    (c.MoveJ, {"q": Q2_, "jerk": 3000.0}, "out_of_range", "jerk", MOST.jerk[0]),
     (c.MoveJ, {"q": Q2_, "jerk": 1e-300}, "out_of_range", "jerk"),
     (c.ServoStart, {"velocity": 4.0}, "limit_velocity", "velocity"),
     (c.ServoStart, {"acceleration": 1e-9}, "out_of_range", "acceleration"),
@@ -148,25 +143,15 @@ WRONG = [  # command, content, code and field; the limit told, or words that hel
     (c.SetPayload, BODY | {"inertia": (0.01, 0.02, 0.0, 0.01, 0.0, 0.01)}, "out_of_range", "inertia"),
     (c.SetPayload, BODY | {"inertia": (0.01, 0.0, 0.0, 0.01, 0.0, 0.03)}, "out_of_range", "inertia"),
     (c.SetPayload, BODY | {"inertia": IMPOSSIBLE}, "out_of_range", "inertia"),
-    (SetRegisters, {"bank": "input_int", "first": 47, "values": (1, 2)}, "out_of_range", "values"),
+    (SetRegisters, INT | {"first": 47, "values": (1, 2)}, "out_of_range", "values"),
     (SetRegisters, {"bank": "input_bit", "first": 100, "values": (True,) * 29}, "out_of_range", "values"),
-    (SetRegisters, {"bank": "input_int", "values": (1, 1.5)}, "out_of_range", "values[1]"),
-    (SetRegisters, {"bank": "input_int", "values": (2**31,)}, "out_of_range", "values[0]"),
-    (SetRegisters, {"bank": "input_int", "values": (True,)}, "out_of_range", "values[0]"),
+    (SetRegisters, INT | {"values": (1, 1.5)}, "out_of_range", "values[1]"),
+    (SetRegisters, INT | {"values": (2**31,)}, "out_of_range", "values[0]"),
+    (SetRegisters, INT | {"values": (True,)}, "out_of_range", "values[0]"),
     (SetRegisters, {"bank": "input_bit", "values": (True, 1)}, "out_of_range", "values[1]"),
     (SetRegisters, {"bank": "input_double", "values": (False,)}, "out_of_range", "values[0]"),
-    (
-        SetRegisters,
-        {"bank": "input_int", "values": (8,), "also": (TOO_MANY,)},
-        "out_of_range",
-        "also[0].values",
-    ),
-    (
-        SetRegisters,
-        {"bank": "input_int", "values": (8,), "also": (NO_BIT,)},
-        "out_of_range",
-        "also[0].values[0]",
-    ),
+    (SetRegisters, INT | {"values": (8,), "also": (TOO_MANY,)}, "out_of_range", "also[0].values"),
+    (SetRegisters, INT | {"values": (8,), "also": (NO_BIT,)}, "out_of_range", "also[0].values[0]"),
     (SetRegisters, {"bank": "output_double", "values": (1.5,), "token": None}, "missing_field", "token"),
     (SimulationReset, {"q": Q2_[:2]}, "out_of_range", "q"),
     (SimulationReset, {"q": Q2_, "shaper": "zvv"}, "unknown_shaper", "shaper"),
@@ -211,16 +196,16 @@ def assert_refused(robot, twin, table):
 
 
 @pytest.mark.parametrize("begin", [Robot.tick, moving, Robot.stream])
-def test_wrong_content_is_refused_and_changes_nothing(begin):
-    """Before it is looked at what the arm does."""
+def test_invalid_commands_are_refused_and_change_nothing(begin):
+    """Content is checked before the present activity."""
     assert_refused(*alike(begin), WRONG)
 
 
-def test_what_cannot_be_planned_is_refused_and_changes_nothing():
+def test_impossible_paths_are_refused_and_change_nothing():
     assert_refused(*alike(Robot.tick, q=tuple(BENT), plant=NoArm()), PLANNED)
 
 
-def test_a_stale_token_is_refused_first_of_all():
+def test_a_stale_token_is_refused_before_other_checks():
     robot, twin = alike(moving)
     wrong = [
         (kind, fields) for kind, fields, *_ in WRONG if kind is not c.TakeControl and "token" not in fields
@@ -232,7 +217,7 @@ def test_a_stale_token_is_refused_first_of_all():
         assert_unchanged(robot, twin, 3)
 
 
-def test_a_step_s_set_points_are_checked():
+def test_set_points_of_a_step_are_checked():
     robot = Robot()
     robot.send(c.ServoStart)
     good, bad = StepSetpoint(sequence=0, q=Q1_), StepSetpoint(sequence=1, q=(9.0, *Q1_[1:]))
@@ -250,14 +235,14 @@ def test_a_step_s_set_points_are_checked():
         *({"q": q} for q in (Q1_[:5], (*Q1_, 0.0), (7.0, *Q1_[1:]), (NAN, *Q1_[1:]))),
     ],
 )
-def test_a_wrong_set_point_is_counted_and_dropped(setpoint):
+def test_an_invalid_set_point_is_counted_and_dropped(setpoint):
     robot, twin = alike(Robot.stream)
     robot.setpoint(**({"sequence": 100, "q": Q1_} | setpoint))
     assert robot.controller.counters.setpoints_refused == 1
     assert_unchanged(robot, twin)
 
 
-def test_a_move_that_would_last_for_hours_is_refused():
+def test_a_move_lasting_hours_is_refused():
     wide = msgspec.structs.replace(UR5E.limits, position=(1e3,) * 6)
     robot = Robot(msgspec.structs.replace(UR5E, limits=wide))
     reply = robot.send(c.MoveJ, q=(900.0, *Q1_[1:]), velocity=0.01)
@@ -266,7 +251,7 @@ def test_a_move_that_would_last_for_hours_is_refused():
 
 
 @pytest.mark.parametrize("name", BUILT_IN.names())
-def test_every_shaper_that_is_named_can_be_chosen(name):
+def test_every_built_in_shaper_can_be_chosen(name):
     modes = wanted_modes(name, 1, "name")
     f_d, zeta = [10.0, 20.0, 40.0, 80.0], [0.1, 0.1, 0.08, 0.08]
     assert choose_filter(name, Fixed(f_d[:modes], zeta[:modes]), 6).name == name
@@ -282,7 +267,7 @@ def estimator(own=None, **fields):
     return choose_source(c.SetEstimator(token="", **fields), setup(calibration=own))
 
 
-def test_a_calibration_comes_as_a_map_or_by_its_name_or_is_the_server_s_own():
+def test_a_calibration_is_given_as_a_map_by_name_or_by_the_setup():
     source = estimator(name="polynomial", calibration=content(name="mine"))
     assert source.calibration.name == "mine"
     assert source.estimator(1, DISC).f_d_min == 5.0
@@ -291,7 +276,7 @@ def test_a_calibration_comes_as_a_map_or_by_its_name_or_is_the_server_s_own():
         assert estimator(own, name="polynomial", calibration=named).calibration is own
 
 
-def test_the_number_of_modes_is_that_of_the_estimator_or_the_filter_s_own():
+def test_the_number_of_modes_is_limited_by_estimator_and_filter():
     source = estimator(name="fixed", f_d=(8.0, 15.0), zeta=(0.2, 0.1))
     assert source.estimator(2, DISC).modes == 2
     reply = refused(make_estimator, source, 3, DISC, "modes")

@@ -1,4 +1,4 @@
-"""What is admitted, and that nothing else is even read."""
+"""Admission of commands, and that nothing else is decoded."""
 
 import math
 
@@ -30,7 +30,7 @@ def refused(message, lease=LEASE):
     return reply.code, reply.where
 
 
-def test_the_holder_s_command_is_admitted_with_what_the_journal_keeps():
+def test_a_command_with_control_is_admitted_with_its_journal_content():
     command = c.MoveJ(token="anna#1", q=Q)
     admitted = admit(encode(command), LEASE)
     assert admitted.command == command
@@ -38,13 +38,13 @@ def test_the_holder_s_command_is_admitted_with_what_the_journal_keeps():
 
 
 @pytest.mark.parametrize("token", ["", "anna#2", "bert#1"])
-def test_a_stranger_s_command_is_not(token):
+def test_a_command_without_control_is_refused(token):
     assert refused(encode(c.MoveJ(token=token, q=Q))) == ("stale_token", "token")
     assert refused(encode(c.MoveJ(token=token, q=Q)), None) == ("no_control", "token")
     assert refused(encode(c.Stop(token=token))) == ("stale_token", "token")
 
 
-def test_anybody_may_stop_and_ask_for_control_that_is_free_or_his():
+def test_stop_and_free_control_need_no_token():
     assert admit(encode(c.Stop()), LEASE).command == c.Stop()
     assert admit(encode(c.TakeControl(client="bert")), None).command.client == "bert"
     assert admit(encode(c.TakeControl(client="anna")), LEASE).command.client == "anna"
@@ -60,18 +60,18 @@ LONG = {"type": "set_estimator", "token": "anna#1", "name": "polynomial", "calib
     ({"type": None}, ("malformed", "")), ({"type": JUNK}, ("malformed", "type")),
     ({"token": JUNK}, ("malformed", "token")), ({}, ("unknown_field", "calibration.a")),
 ])  # fmt: skip
-def test_of_a_long_message_little_is_read_before_its_sender_is_known(changes, answer):
+def test_a_long_message_is_decoded_only_after_its_token_is_checked(changes, answer):
     data = msgpack.packb(LONG | changes)
     assert EXPLAINED_BYTES < len(data) <= MAX_BYTES
     assert refused(data) == answer
 
 
-def test_a_long_sentence_of_the_sender_s_is_cut():
+def test_long_content_is_cut_in_refusals():
     reply = admit(msgpack.packb({"type": "x" * 100_000}), LEASE)
     assert len(reply.why) < 200
 
 
-def test_setpoints_are_the_holder_s_alone():
+def test_set_points_need_control():
     setpoint = {"type": "setpoint", "token": "anna#1", "sequence": 3, "q": Q}
     assert admit_setpoint(msgpack.packb(setpoint), LEASE) == c.Setpoint(token="anna#1", sequence=3, q=Q)
     assert admit_setpoint(msgpack.packb(setpoint), None) is None
@@ -84,7 +84,7 @@ def authority(*, realtime=True, instance=""):
     return Authority(lambda _: None, lambda *_, **__: None, realtime=realtime, instance=instance)
 
 
-def test_a_token_of_before_a_restart_is_never_valid_again():
+def test_a_token_from_before_a_restart_is_invalid():
     before, after = (authority(instance=instance) for instance in ("1f", "2e"))
     old = before.take("a", 30.0, 0.0).token
     new = after.take("a", 30.0, 0.0).token
@@ -94,7 +94,7 @@ def test_a_token_of_before_a_restart_is_never_valid_again():
 
 
 @pytest.mark.parametrize("second", ["2f", ""])
-def test_of_two_sessions_under_one_name_nobody_can_tell_who_asks(second):
+def test_two_sessions_with_the_same_client_name_are_refused_control(second):
     presence = Presence()
     presence.seen("a", "1f")
     presence.seen("b", "1f")
@@ -118,7 +118,7 @@ SILENCE = round(TIMEOUT / H) + 1
 
 @pytest.fixture
 def streaming():
-    """A host in real time whose client streams, and its sink."""
+    """Return a host in real time with a streaming client, and its sink."""
     sink = Kept()
     host = Host(Controller(setup(clock="realtime")), sink)
     host.request(encode(c.TakeControl(client="a")))
@@ -140,13 +140,13 @@ def end_of(host, sink):
 @pytest.mark.parametrize(
     ("fault", "said"),
     [
-        ({"q": Q1[:5]}, "q has 5 angles; the arm has 6"),
+        ({"q": Q1[:5]}, "q has 5 values: must be 6, one per joint"),
         ({"q": (math.nan, *Q1[1:])}, "q[0] is NaN, not a number"),
         ({"q": (*Q1[:5], math.inf)}, "q[5] is inf: must be at most 1000"),
-        ({"q": (*Q1[:5], 6.5)}, "q[5] is 6.5 rad; the joint goes to ±6.28319"),
+        ({"q": (*Q1[:5], 6.5)}, "q[5] is 6.5 rad: must be within ±6.28319 rad"),
     ],
 )
-def test_the_end_of_a_silent_stream_names_the_last_refusal(streaming, fault, said):
+def test_a_silent_stream_ends_with_the_last_refusal(streaming, fault, said):
     host, sink = streaming
     offered(host, token=host.controller.session.lease.token, sequence=1)
     offered(host, **({"token": host.controller.session.lease.token} | fault))
@@ -156,7 +156,7 @@ def test_the_end_of_a_silent_stream_names_the_last_refusal(streaming, fault, sai
 
 
 @pytest.mark.parametrize("fault", [{}, {"q": Q1[:5]}, {"q": (math.nan, *Q1[1:])}])
-def test_a_stranger_s_set_points_are_not_blamed(streaming, fault):
+def test_set_points_of_other_clients_are_not_reported_at_the_end_of_a_stream(streaming, fault):
     host, sink = streaming
     offered(host, token="other", **fault)
     assert end_of(host, sink) == "no set-point for 0.25 s"
@@ -164,8 +164,8 @@ def test_a_stranger_s_set_points_are_not_blamed(streaming, fault):
 
 
 @pytest.mark.parametrize("fault", [{}, {"q": (math.nan, *Q1[1:])}])
-def test_the_lease_at_the_moment_of_carrying_out_counts(streaming, fault):
-    """A set-point may wait long after its admission: then it is none of the client's that has control meanwhile."""
+def test_a_set_point_needs_control_when_it_is_carried_out(streaming, fault):
+    """A set-point may wait long after admission, and another client may have control by then."""
     host, sink = streaming
     token = host.controller.session.lease.token
     waiting = admit_setpoint(
@@ -180,7 +180,7 @@ def test_the_lease_at_the_moment_of_carrying_out_counts(streaming, fault):
     assert host.controller.counters.setpoints_refused == 1
 
 
-def test_what_was_refused_in_an_earlier_stream_is_not_blamed_for_the_end_of_the_next(streaming):
+def test_refusals_of_an_earlier_stream_are_not_reported(streaming):
     host, sink = streaming
     token = host.controller.session.lease.token
     offered(host, token=token, q=Q1[:5])

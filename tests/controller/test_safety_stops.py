@@ -1,4 +1,4 @@
-"""Stops of UR's categories 0, 1 and 2, and what the safety system keeps."""
+"""Stops of UR's categories 0, 1 and 2, and states that the safety system keeps."""
 
 import numpy as np
 import pytest
@@ -33,7 +33,7 @@ def moving(ticks=300):
     return robot
 
 
-def test_a_safeguard_stop_pauses_the_motion_and_its_release_lets_it_go_on():
+def test_a_safeguard_stop_pauses_the_motion_until_its_release():
     robot = moving()
     inject(robot, "safeguard_stop")
     robot.tick(1500)
@@ -51,7 +51,7 @@ def test_a_safeguard_stop_pauses_the_motion_and_its_release_lets_it_go_on():
 
 
 @pytest.mark.parametrize("first", ["pause", "safeguard"])
-def test_a_motion_that_its_client_paused_waits_for_its_client(first):
+def test_a_motion_paused_by_a_client_waits_for_resume(first):
     robot = moving()
     for what in ("pause", "safeguard") if first == "pause" else ("safeguard", "pause"):
         robot.send(c.Pause) if what == "pause" else inject(robot, "safeguard_stop")
@@ -67,7 +67,7 @@ def test_a_motion_that_its_client_paused_waits_for_its_client(first):
 @pytest.mark.parametrize(
     ("fault", "mode"), [("emergency_stop", "ROBOT"), ("system_emergency_stop", "SYSTEM")]
 )
-def test_an_emergency_stop_stops_on_the_way_and_takes_the_power_until_it_is_released(fault, mode):
+def test_an_emergency_stop_stops_on_the_path_and_cuts_power_until_released(fault, mode):
     robot, mode = moving(), SafetyMode[f"{mode}_EMERGENCY_STOP"]
     inject(robot, fault)
     assert modes(robot.tick()) == (mode, RobotMode.RUNNING), "the drives still brake the arm"
@@ -91,7 +91,7 @@ def modes(state):
 
 
 @pytest.mark.parametrize("fault", ["violation", "fault"])
-def test_a_violation_or_fault_closes_the_brakes_and_stays_until_safety_is_restarted(fault):
+def test_a_violation_or_fault_brakes_and_stays_until_safety_is_restarted(fault):
     robot, mode = moving(500), SafetyMode[fault.upper()]
     inject(robot, fault)
     assert modes(robot.tick()) == (mode, RobotMode.POWER_OFF)
@@ -110,14 +110,14 @@ def test_a_violation_or_fault_closes_the_brakes_and_stays_until_safety_is_restar
     assert isinstance(robot.send(c.MoveJ, **MOVE), Accepted)
 
 
-def test_a_loss_of_power_brakes_at_once_and_leaves_the_safety_system_alone():
+def test_a_power_loss_brakes_without_a_safety_fault():
     robot = moving(500)
     inject(robot, "power_loss")
     assert modes(robot.until_rest()) == (SafetyMode.NORMAL, RobotMode.POWER_OFF)
     assert robot.send(c.PowerOn) == Done()
 
 
-def test_every_safety_mode_has_its_bit():
+def test_safety_modes_have_their_rtde_bits():
     """RTDE's numbers: bit 5 system emergency stop, 6 robot, 7 either, 8 violation, 9 fault, 10 stopped by safety."""
     bits = {mode: {bit for bit in range(11) if SAFETY_BITS[mode] >> bit & 1} for mode in SAFETY_BITS}
     assert bits[SafetyMode.SAFEGUARD_STOP] == {4, 10}
@@ -128,11 +128,11 @@ def test_every_safety_mode_has_its_bit():
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_brakes_bring_the_arm_to_rest_and_take_energy_all_the_way(seed):
-    """Joints never speed up by the brakes themselves, each stays once it rests, and all rest in the end."""
+def test_brakes_slow_every_joint_monotonically_to_rest(seed):
+    """Brakes never speed a joint up, a joint that rests stays at rest, and all rest in the end."""
     random = np.random.default_rng(seed)
     state = Target(random.uniform(-3, 3, 6), random.uniform(-3, 3, 6), np.zeros(6))
-    way = brake(UR5E, body(paper_payload(UR5E, float(random.uniform(0, 5)))), state, H)
+    way = brake(UR5E, body(paper_payload(UR5E, float(random.uniform(0, 5)))), state)
     q = [state.q]
     while not way.finished:
         q.append(way.next())
@@ -147,7 +147,7 @@ def test_brakes_bring_the_arm_to_rest_and_take_energy_all_the_way(seed):
 
 
 @pytest.mark.parametrize("fault", ["safeguard_stop", "emergency_stop", "reduced"])
-def test_an_input_that_is_set_anew_does_not_end_by_what_it_was_set_to_before(fault):
+def test_a_safety_input_set_again_loses_its_earlier_end_time(fault):
     robot = Robot()
     inject(robot, fault, seconds=0.1)
     inject(robot, "normal")
@@ -174,7 +174,7 @@ REASONS = {
 
 
 @pytest.mark.parametrize("fault", REASONS)
-def test_every_stop_has_its_reason_and_its_tick(fault):
+def test_info_has_reason_and_tick_of_every_stop(fault):
     robot = moving(100)
     assert said(robot).stop is None
     inject(robot, fault)
@@ -183,7 +183,7 @@ def test_every_stop_has_its_reason_and_its_tick(fault):
     assert said(robot).stop.tick == 101
 
 
-def test_an_emergency_stop_that_was_released_says_why_there_is_no_power():
+def test_info_names_a_released_emergency_stop_while_power_is_off():
     robot = Robot()
     inject(robot, "emergency_stop")
     inject(robot, "normal")
@@ -193,7 +193,7 @@ def test_an_emergency_stop_that_was_released_says_why_there_is_no_power():
     assert said(robot).stop is None
 
 
-def test_what_comes_during_a_graver_stop_does_not_take_its_place():
+def test_a_less_severe_stop_does_not_replace_the_reason():
     robot = Robot()
     inject(robot, "violation")
     for fault in ("safeguard_stop", "emergency_stop"):

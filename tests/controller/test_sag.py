@@ -1,4 +1,4 @@
-"""Compensation of sag: at rest the arm is where its target is, and nothing else changes."""
+"""Compensation of sag: at rest the arm is at its target, and nothing else changes."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,7 @@ def line(description=UR5E, mass=5.0, q=Q1, *, compensated=True, name="none", **c
 
 
 def commands_of(cycle):
-    """Commands to the drives from now on, and the references that they belong to."""
+    """Return the drive commands from now on, and their references."""
     found, made = [], cycle.drives.command
 
     def watched(signals, *arguments, **options):
@@ -55,7 +55,7 @@ def play(cycle, trajectory, rest=0):
 
 
 def random_payload(random):
-    """A payload of up to 5 kg, with its centre anywhere near the flange."""
+    """Return a payload of up to 5 kg with its centre near the flange."""
     mass = random.uniform(0, 5)
     return Payload(
         mass=mass, com=tuple(random.uniform(-0.1, 0.1, 3)), inertia=(0.01, 0.0, 0.0, 0.01, 0.0, 0.01)
@@ -63,7 +63,7 @@ def random_payload(random):
 
 
 @pytest.mark.parametrize("arm", [UR5E, UR5E.clean(), UR5E.quiet()], ids=["real", "clean", "quiet"])
-def test_a_resting_arm_is_on_its_target_in_any_posture_with_any_payload(arm):
+def test_sag_compensation_places_a_resting_arm_on_its_target(arm):
     random, sagged = np.random.default_rng(7), 0.0
     compensated, plain = line(arm), line(arm, compensated=False)
     for _ in range(40):
@@ -80,7 +80,7 @@ def test_a_resting_arm_is_on_its_target_in_any_posture_with_any_payload(arm):
 
 
 @pytest.mark.parametrize(("name", "mass"), [("none", 0.0), ("zv", 5.0)])
-def test_friction_leaves_the_arm_on_its_target_a_fifth_of_a_second_after_a_move(name, mass):
+def test_sag_compensation_holds_after_a_move_despite_friction(name, mass):
     for start, end in ((Q1, Q3), (Q1, Q2)):
         cycle = line(mass=mass, q=start, name=name)
         samples = play(cycle, cycle.plan(end, PAPER), rest=600)
@@ -88,13 +88,13 @@ def test_friction_leaves_the_arm_on_its_target_a_fifth_of_a_second_after_a_move(
 
 
 def leads(found):
-    """Angles by which the motors lead, their velocities and accelerations, from tick to tick."""
+    """Return the angles by which the motors lead, with velocities and accelerations, tick by tick."""
     lead = np.array([command.q - q for command, q in found])
     return lead, np.diff(lead, axis=0) / H, np.diff(lead, 2, axis=0) / H**2
 
 
-def test_in_motion_the_lead_moves_without_steps_and_as_little_as_the_twist_that_it_compensates():
-    """Of 3.3 mrad, over a motion of two seconds; the wind-up feed-forward is the same with and without."""
+def test_sag_compensation_changes_smoothly_in_motion():
+    """The change is 3.3 mrad in two seconds; wind-up feed-forward is the same with and without."""
     found = {}
     for compensated in (True, False):
         cycle = line(compensated=compensated)

@@ -1,11 +1,11 @@
-"""Stops: their trajectories, and in mid-motion at random moments."""
+"""Stops: their trajectories, at random moments of a motion."""
 
 import numpy as np
 import pytest
 
 from tvist_controller.foresight.stops import DECELERATION_RATIO, StopPlanner
+from tvist_controller.kinematics.arm import InverseDynamics
 from tvist_controller.line.differentiator import Target
-from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.line.limits import GENTLEST_STOP, TORQUE_SHARE, StopTorque, acceleration_on_way
 from tvist_controller.trajectory import JointLine, MotionLimits, quickest_motion
 from tvist_protocol import commands as c
@@ -16,7 +16,7 @@ from .robots import PAPER, Q1, Q2, Q3, UR5E, H, Robot, stop, without_arm
 
 
 def run(line, ticks):
-    """Published targets of some ticks."""
+    """Return the published targets of some ticks."""
     samples = [line.step() for _ in range(ticks)]
     return np.array([[s.target.q, s.target.qd, s.target.qdd] for s in samples])
 
@@ -28,8 +28,8 @@ def until_rest(line):
     return np.array(out)
 
 
-def test_a_stop_that_torque_would_let_go_through_the_floor_is_no_later_than_the_move():
-    """Where no rung of decelerations keeps the torque, the move itself is the stop."""
+def test_a_stop_is_no_later_and_no_further_than_the_move():
+    """If no deceleration on the ladder keeps the torque limits, the move itself is the stop."""
     robot = Robot()
     robot.send(SimulationReset, q=(0.0, -1.57, 0.0, -1.57, 0.0, 0.0))
     limits = {"velocity": 3.14, "acceleration": 4.0, "jerk": 2000.0}
@@ -52,7 +52,7 @@ def test_a_stop_that_torque_would_let_go_through_the_floor_is_no_later_than_the_
     assert max(lasted) == lasted[0]
 
 
-def test_a_move_whose_torque_would_pass_a_limit_is_slower_and_says_so():
+def test_a_move_beyond_a_torque_limit_is_slower_with_a_warning():
     robot = Robot(shaper="none")
     robot.send(SimulationReset, q=(0.0, -0.9, 0.0, -1.57, 0.0, 0.0))
     target = (0.0, -0.3, 0.0, -1.57, 0.0, 0.0)
@@ -66,7 +66,7 @@ def test_a_move_whose_torque_would_pass_a_limit_is_slower_and_says_so():
     assert Robot().send(c.MoveJ, q=tuple(Q3)).limited is None
 
 
-def test_a_harder_stop_takes_over_from_a_gentle_one():
+def test_only_a_harder_stop_replaces_a_gentle_one():
     def way(*decelerations):
         line = without_arm()
         line.begin(line.plan(Q2, PAPER))
@@ -82,8 +82,8 @@ def test_a_harder_stop_takes_over_from_a_gentle_one():
 
 
 @pytest.mark.parametrize(("name", "way"), [("um_zv", 0.003), ("um_zv", 0.6), ("um_zvd", 0.05)])
-def test_with_negative_impulses_a_motion_is_done_only_where_nothing_more_comes_of_the_filter(name, way):
-    """Their echoes cancel for a moment: a shaped reference that stands may go on."""
+def test_with_negative_impulses_a_motion_is_done_after_all_echoes(name, way):
+    """Echoes cancel for a moment: a shaped reference that stands still may move again."""
     robot = Robot()
     robot.send(c.SetEstimator, name="fixed", f_d=(5.0,), zeta=(0.05,))
     robot.send(c.SetShaper, name=name)
@@ -99,9 +99,9 @@ LIMITS = UR5E.limits
 
 
 def plan(q, qd, qdd, wanted=None, *, payload=DISC, description=UR5E, clear=lambda _: True):
-    """The stop of every joint by itself, as a stream is stopped."""
+    """Return the stop of independent joints, as for a stream."""
     state = Target(*(np.array(values, dtype=float) for values in (q, qd, qdd)))
-    planner = StopPlanner(description, InverseDynamics(description, payload), H)
+    planner = StopPlanner(description, InverseDynamics(description, payload))
     return planner.by_joints(state, wanted, clear)
 
 
@@ -111,12 +111,12 @@ def moving(seed):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_of_all_decelerations_that_keep_the_torque_the_hardest_is_taken(seed):
-    """Each is asked for itself: what a hard stop does not keep a gentler one may not, either."""
+def test_a_stop_uses_the_hardest_deceleration_within_torque_limits(seed):
+    """Each deceleration is checked by itself: a gentler stop may fail where a harder one does."""
     state = Target(*map(np.array, moving(seed)))
     stop = plan(*state.__reduce__()[1])
     torque = StopTorque(InverseDynamics(UR5E, DISC), state, np.array(LIMITS.torque))
-    planner = StopPlanner(UR5E, InverseDynamics(UR5E, DISC), H)
+    planner = StopPlanner(UR5E, InverseDynamics(UR5E, DISC))
     tried = [min(LIMITS.acceleration) * DECELERATION_RATIO**k for k in range(16)]
     held = [a for a in tried if torque.holds(planner.stop(state, a))]
     if held:
@@ -125,7 +125,7 @@ def test_of_all_decelerations_that_keep_the_torque_the_hardest_is_taken(seed):
         assert torque.holds(stop, rebound=False) or stop.acceleration == GENTLEST_STOP
 
 
-def test_a_stop_that_is_not_clear_is_passed_over_for_one_that_is():
+def test_a_colliding_stop_is_replaced_by_a_clear_one():
     state = Q3, [1.0, 0.0, 0.0, 0.0, 0.0, 0.0], np.zeros(6)
     free = plan(*state)
     assert plan(*state, clear=lambda stop: stop.acceleration < 5.0).acceleration < 5.0 < free.acceleration
@@ -136,8 +136,8 @@ def test_a_stop_that_is_not_clear_is_passed_over_for_one_that_is():
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_stop_is_no_protective_stop(seed):
-    """The flexible arm swings beyond what is asked of it, but never for more than 10 ms beyond its drives' limits."""
+def test_a_stop_causes_no_torque_overload(seed):
+    """The flexible arm overshoots the demand, but never exceeds its drives' limits for more than 10 ms."""
     random = np.random.default_rng(seed)
     robot = Robot(seed=seed)
     if seed % 2:
@@ -154,13 +154,13 @@ def test_a_stop_is_no_protective_stop(seed):
 
 
 @pytest.mark.parametrize("wanted", [5e-324, 1e-9, 1e-3, 0.5])
-def test_no_stop_lasts_for_ever(wanted):
+def test_very_gentle_stops_use_the_gentlest_deceleration(wanted):
     stop = plan(Q3, [1.5, 0, 0, 0, 0, 0], np.zeros(6), wanted)
     assert stop.acceleration == GENTLEST_STOP
     assert stop.duration < 2.0
 
 
-def test_a_wish_that_would_end_beyond_the_joint_s_range_is_overruled():
+def test_a_stop_that_would_leave_the_joint_range_is_harder():
     q = (6.0, *Q3[1:])
     stop = plan(q, [1.0, 0, 0, 0, 0, 0], np.zeros(6), 1.0)
     assert stop.acceleration > 1.0
@@ -168,13 +168,13 @@ def test_a_wish_that_would_end_beyond_the_joint_s_range_is_overruled():
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_motion_with_the_acceleration_that_its_way_leaves_keeps_its_share_of_torque(seed):
+def test_the_acceleration_on_a_path_keeps_its_torque_share(seed):
     random = np.random.default_rng(seed)
     start, target = random.uniform(-2, 2, (2, 6))
     line, dynamics, most = JointLine(start, target), InverseDynamics(UR5E, DISC), np.array(LIMITS.torque)
     velocity = random.uniform(0.5, 3.1)
     room = acceleration_on_way(dynamics, line, start, target - start, velocity, most)
-    motion, q = quickest_motion(line, MotionLimits(velocity, room, 2000.0), H), [start, start]
+    motion, q = quickest_motion(line, MotionLimits(velocity, room, 2000.0)), [start, start]
     while not motion.finished:
         q.append(motion.next())
     q = np.array(q)

@@ -9,11 +9,12 @@ from tests.plant.arms import chain
 
 from tvist_controller.foresight import clearance
 from tvist_controller.foresight.collision import CollisionModel
+from tvist_controller.kinematics.arm import InverseDynamics
 from tvist_controller.line import differentiator
 from tvist_controller.line import limits as line_limits
 from tvist_controller.line.differentiator import Target
-from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.line.limits import TORQUE_SHARE, StreamTorqueMargin
+from tvist_controller.line.line_tick import TORQUE
 from tvist_controller.setup import body, paper_payload
 from tvist_controller.trajectory import JointStop, MotionLimits, SetpointStream, limiter, stream
 from tvist_plant.description import load
@@ -25,16 +26,16 @@ SLOW = 0.008
 
 
 def regular(function, count, *, every=1, first=0):
-    """A set-point at every so many ticks, made of the time of its number."""
+    """Return a set-point every few ticks, computed from its time."""
     return {first + every * k: [(k, function((every * H) * k))] for k in range(count)}
 
 
 def start(period=H, limits=PAPER, q=(0.0,)):
-    return SetpointStream(np.array(q, dtype=float), period, limits, H)
+    return SetpointStream(np.array(q, dtype=float), period, limits)
 
 
 def gentle(time, amplitude=0.2, omega=2.0):
-    """Begins like t⁴ and goes on with at most 2 A ω² = 1.6 rad/s² and 3 A ω³ = 4.8 rad/s³."""
+    """Return a motion that begins like t⁴, with at most 2 A ω² = 1.6 rad/s² and 3 A ω³ = 4.8 rad/s³."""
     return 0.5 * amplitude * (1.0 - np.cos(omega * time)) ** 2
 
 
@@ -42,7 +43,7 @@ def jumps(out):
     return np.abs(np.diff(out, 2, axis=0)).max() / H**2
 
 
-def test_at_500_hz_the_reference_is_the_set_points_to_the_bit():
+def test_a_500_hz_stream_passes_unchanged():
     stream = start(q=(0.0, 1.0))
     wanted = np.stack([gentle(np.arange(3000) * H), np.ones(3000)], axis=1)
     out = played(stream, {k: [(k, q)] for k, q in enumerate(wanted)}, 3000)
@@ -52,7 +53,7 @@ def test_at_500_hz_the_reference_is_the_set_points_to_the_bit():
 
 
 @pytest.mark.parametrize("first", [40, 2**63 - 200, 2**64 - 500])
-def test_a_stream_may_begin_with_any_number(first):
+def test_a_stream_may_start_with_any_sequence_number(first):
     stream = start()
     out = played(stream, {k: [(first + k, gentle(k * H))] for k in range(500)}, 500)
     assert (out[:, 0] == gentle(np.arange(500) * H)).all()
@@ -61,7 +62,7 @@ def test_a_stream_may_begin_with_any_number(first):
 
 @pytest.mark.parametrize("leap", [2**63, 2**64 - 1])
 @pytest.mark.parametrize("period", [H, SLOW])
-def test_a_leap_of_the_number_is_survived_and_counted_with_measure(leap, period):
+def test_a_leap_of_the_sequence_number_keeps_limits(leap, period):
     every = round(period / H)
     arrivals = regular(gentle, 100, every=every)
     arrivals[100 * every] = [(leap, gentle(period * 100))]
@@ -74,8 +75,8 @@ def test_a_leap_of_the_number_is_survived_and_counted_with_measure(leap, period)
     assert stream.lost == SetpointStream.MAX_WAITING
 
 
-def test_one_that_comes_a_tick_late_is_waited_for_from_then_on_and_forgotten_after_a_while():
-    """It is made up of the parabola through those before it, and counted; a set-point a tick late finds its place."""
+def test_the_delay_adapts_to_late_set_points_and_back():
+    """Missing points are extrapolated and counted; a point one tick late is used."""
     arrivals = regular(gentle, 1500)
     for late in range(200, 501, 30):
         arrivals[late + 1] = [*arrivals[late + 1], *arrivals.pop(late)]
@@ -90,7 +91,7 @@ def test_one_that_comes_a_tick_late_is_waited_for_from_then_on_and_forgotten_aft
     assert stream.lost == 0
 
 
-def test_duplicates_and_latecomers_are_dropped_and_counted():
+def test_duplicate_and_late_set_points_are_dropped_and_counted():
     arrivals = regular(gentle, 300)
     arrivals[100] += [(100, 1.0), (100, 1.0), (50, 1.0)]
     stream = start()
@@ -100,7 +101,7 @@ def test_duplicates_and_latecomers_are_dropped_and_counted():
     assert not stream.offer(3, np.zeros(1))
 
 
-def test_a_gap_is_bridged_by_the_parabola_and_counted():
+def test_a_missing_set_point_is_extrapolated_and_counted():
     arrivals = regular(lambda t: 0.5 * np.maximum(t - 0.02, 0.0) ** 2, 300)
     del arrivals[150]
     stream = start(limits=MotionLimits(1.5, 2.0, 2000.0))
@@ -109,7 +110,7 @@ def test_a_gap_is_bridged_by_the_parabola_and_counted():
     assert (stream.late, stream.lost) == (0, 1)
 
 
-def test_a_burst_after_a_break_is_admitted_whole_and_nothing_is_lost():
+def test_a_burst_after_a_break_is_accepted_without_loss():
     arrivals = regular(gentle, 3000)
     arrivals[450] = [entry for k in range(400, 451) for entry in arrivals.pop(k)]
     stream = start()
@@ -131,7 +132,7 @@ def test_a_step_of_half_a_radian_stays_within_the_limits(period):
 
 
 @pytest.mark.parametrize("jerk", [0.1, 100.0])
-def test_coming_to_rest_is_no_journey_however_low_the_jerk_limit(jerk):
+def test_a_silent_stream_rests_soon_even_with_a_low_jerk_limit(jerk):
     """A stream may have any acceleration; taking 40 rad/s² back at 0.1 rad/s³ would last 400 s."""
     stream = start(limits=MotionLimits(3.0, 40.0, jerk))
     played(stream, regular(lambda t: 0.5 * 39.0 * t * t, 20), 20)
@@ -142,7 +143,7 @@ def test_coming_to_rest_is_no_journey_however_low_the_jerk_limit(jerk):
 
 
 def delay(period):
-    """B-spline and spare, two periods and one, of a stream that is in time; a tick less, as it is known at once."""
+    """Return a timely stream's delay: three periods (B-spline and spare), less a tick."""
     return 3 * period - H
 
 
@@ -151,8 +152,8 @@ def delayed(ticks, function, period=SLOW):
 
 
 @pytest.mark.parametrize("period", [0.003, 0.004, SLOW, 0.02, 0.05])
-def test_slower_streams_come_out_three_periods_late(period):
-    """The B-spline runs at q̈ T²/6 beside the set-points."""
+def test_slower_streams_are_delayed_by_three_periods(period):
+    """The B-spline deviates from the set-points by q̈ T²/6."""
     stream = start(period)
     out = played(stream, network(lambda t: gentle(t)[:, None], period, 4.0), 2000)[:, 0]
     # Where the period is no whole number of ticks, some set-points are seen a part of a tick late.
@@ -164,8 +165,8 @@ def test_slower_streams_come_out_three_periods_late(period):
 
 
 @pytest.mark.parametrize("period", [0.004, SLOW, 0.02, 0.05])
-def test_a_stream_at_the_limits_comes_out_within_them_and_is_never_limited(period):
-    """Made by the double-S at the very limits of the stream: second and third differences are means of theirs."""
+def test_a_stream_at_its_limits_passes_without_limitation(period):
+    """The double-S is at the limits: its differences are means of its derivatives."""
     motion = there_and_back(PAPER)
     stream = start(period, q=motion(np.zeros(1))[0])
     out = played(stream, network(motion, period, 5.0), 2500)
@@ -176,8 +177,8 @@ def test_a_stream_at_the_limits_comes_out_within_them_and_is_never_limited(perio
 
 @pytest.mark.parametrize("pause", [0.1, 0.2, 0.8])
 @pytest.mark.parametrize("period", [H, SLOW])
-def test_a_sender_that_pauses_is_waited_for_and_goes_on_from_there(period, pause):
-    """It comes to rest inside the limits, and nothing that comes afterwards is lost."""
+def test_a_stream_continues_after_a_pause_of_its_sender(period, pause):
+    """It rests within the limits, and no later set-point is lost."""
     every, gap = round(period / H), round(pause / H)
     count = round(0.8 / period)
     arrivals = regular(gentle, count, every=every)
@@ -199,8 +200,8 @@ MOST = np.array(UR5E.limits.torque)
 
 @pytest.mark.parametrize("frequency", [1.5, 3.0])
 @pytest.mark.parametrize("start", [Q1, Q3])
-def test_the_shaped_torque_stays_within_its_share_whatever_the_stream_asks_for(start, frequency):
-    """Two per thousand for what lies between a reference and its shaped one."""
+def test_a_shaped_stream_keeps_its_torque_share(start, frequency):
+    """Two per thousand are for the difference between a reference and its shaped one."""
     line = without_arm(q=start)
     stream = line.stream(H, MotionLimits(3.0, 40.0, 2000.0))
     motion = swinging([0.05, 0.1, 0.1, 0.1, 0.1, 0.1], frequency, 0.4)
@@ -208,7 +209,7 @@ def test_the_shaped_torque_stays_within_its_share_whatever_the_stream_asks_for(s
     for k, q in enumerate(motion(np.arange(900) * H)):
         stream.offer(k, start + q)
         samples.append(line.step())
-    shares = np.abs([sample.torque for sample in samples]) / MOST
+    shares = np.abs([sample.signals[TORQUE] for sample in samples]) / MOST
     assert shares.max() <= TORQUE_SHARE * 1.002
     asked = np.array([start + q for q in motion(np.arange(900) * H)])
     needed = [
@@ -228,7 +229,7 @@ MOTIONS = {
 
 
 def begin(motion, period, limits=PAPER):
-    return SetpointStream(motion(np.zeros(1))[0], period, limits, H)
+    return SetpointStream(motion(np.zeros(1))[0], period, limits)
 
 
 def follow(motion, period, limits=PAPER, **network_):
@@ -237,7 +238,7 @@ def follow(motion, period, limits=PAPER, **network_):
 
 
 def from_clean(out, clean):
-    """Largest distance from a clean stream that is played out as late, whatever that is [rad]."""
+    """Return the largest distance from a clean stream, whatever its lag [rad]."""
     ticks = np.arange(len(out))
     columns = list(zip(out.T, clean.T, strict=True))
     return min(
@@ -247,7 +248,7 @@ def from_clean(out, clean):
 
 
 @pytest.mark.parametrize("name", MOTIONS)
-def test_at_125_hz_jitter_and_loss_show_by_less_than_two_milliradians(name):
+def test_jitter_and_loss_at_125_hz_change_the_stream_by_under_two_mrad(name):
     _, clean = follow(MOTIONS[name], 0.008)
     for seed in range(3):
         stream, out = follow(MOTIONS[name], 0.008, seed=seed, jitter=1.0, loss=0.05, twice=0.03)
@@ -259,8 +260,8 @@ def test_at_125_hz_jitter_and_loss_show_by_less_than_two_milliradians(name):
 
 @pytest.mark.parametrize("clock", [-0.005, 0.005])
 @pytest.mark.parametrize("period", [H, 0.008, 0.02])
-def test_a_clock_that_is_half_a_percent_off_is_followed(period, clock):
-    """The delay goes with it, smoothly: at 500 Hz most of a slow one are made up, of those a tick before."""
+def test_a_sender_clock_off_by_half_a_percent_is_followed(period, clock):
+    """The delay follows smoothly; at 500 Hz most points of a slow clock are extrapolated."""
     motion = MOTIONS["sine"]
     stream, out = follow(motion, period, clock=clock, jitter=0.3)
     assert_within(out)
@@ -286,7 +287,7 @@ def test_a_clock_that_is_half_a_percent_off_is_followed(period, clock):
     jitter=st.floats(0.0, 10.0),
     wildness=st.sampled_from([0.0, 1e-4, 0.1, 6.0]),
 )
-def test_whatever_comes_stays_finite_in_range_and_inside_the_limits(seed, period, limits, jitter, wildness):
+def test_random_streams_stay_finite_in_range_and_within_limits(seed, period, limits, jitter, wildness):
     random = np.random.default_rng(seed)
     reach = np.full(2, 6.3)
     swing = swinging([0.3, -0.2], 1.0, 0.3)
@@ -297,7 +298,7 @@ def test_whatever_comes_stays_finite_in_range_and_inside_the_limits(seed, period
     arrivals = network(
         motion, period, 1.0, seed=seed, jitter=jitter, loss=0.2, twice=0.2, burst=random.integers(1, 12)
     )
-    stream = SetpointStream(np.zeros(2), period, limits, H, reach=reach)
+    stream = SetpointStream(np.zeros(2), period, limits, reach=reach)
     out = played(stream, arrivals, 700)
     velocity, acceleration, jerk = (np.abs(np.diff(out, n, axis=0)).max() / H**n for n in (1, 2, 3))
     assert np.isfinite(out).all()
@@ -312,7 +313,7 @@ MODULES = (clearance, differentiator, limiter, line_limits, stream)
 
 @pytest.fixture
 def in_python(monkeypatch):
-    """Calls a function with all kernels replaced by their Python source."""
+    """Return a function that calls another one with all kernels replaced by their Python source."""
 
     def call(function):
         with monkeypatch.context() as patched:
@@ -326,7 +327,7 @@ def in_python(monkeypatch):
 
 
 @pytest.mark.parametrize(("period", "share"), [(H, 1.0), (0.003, 0.9), (0.008, 1.6)])
-def test_a_stream_is_played_alike_in_python_to_the_bit(period, share, in_python):
+def test_stream_kernels_are_bit_equal_in_python(period, share, in_python):
     """Within its limits, at them and beyond."""
     wanted = there_and_back(
         MotionLimits(share * PAPER.velocity, share * PAPER.acceleration, share * PAPER.jerk)
@@ -335,7 +336,7 @@ def test_a_stream_is_played_alike_in_python_to_the_bit(period, share, in_python)
     room = StreamTorqueMargin(UR5E, InverseDynamics(UR5E, UR5E.payload))
 
     def play():
-        stream = SetpointStream(np.zeros(6), period, PAPER, H, reach=np.full(6, 6.28), torque=room)
+        stream = SetpointStream(np.zeros(6), period, PAPER, reach=np.full(6, 6.28), torque=room)
         return played(stream, arrivals, 600), stream.limited
 
     (compiled, limited), (plain, limited_plain) = play(), in_python(play)
@@ -344,7 +345,7 @@ def test_a_stream_is_played_alike_in_python_to_the_bit(period, share, in_python)
 
 
 @pytest.mark.parametrize(("arm", "beyond"), [("ur5e", 0.0), ("ur5e", 1.0), ("one-joint", 0.0)])
-def test_the_room_of_the_torque_is_that_of_numpy_to_the_bit(arm, beyond):
+def test_the_torque_margin_kernel_is_bit_equal_to_numpy(arm, beyond):
     description = load(arm)
     dynamics, random = InverseDynamics(description, description.payload), np.random.default_rng(2)
     limit, n = np.array(description.limits.torque), description.joints
@@ -365,12 +366,12 @@ def test_the_room_of_the_torque_is_that_of_numpy_to_the_bit(arm, beyond):
 
 
 @pytest.mark.parametrize("limit", [1.0, 8.0, 40.0])
-def test_the_stop_in_closed_form_is_ruckigs(limit):
+def test_the_closed_form_stop_matches_ruckig(limit):
     random = np.random.default_rng(int(limit))
     for scale in (1e-3, 1.0):
         qd, qdd = scale * random.uniform(-3, 3, 40), scale * random.uniform(-60, 60, 40)
         qd[:4], qdd[4:8] = 0.0, 0.0
-        stop = JointStop(np.zeros(40), qd, qdd, acceleration=limit, jerk=2000.0, period=H)
+        stop = JointStop(np.zeros(40), qd, qdd, acceleration=limit, jerk=2000.0)
         durations = []
         for j, (v, a) in enumerate(zip(qd.tolist(), qdd.tolist(), strict=True)):
             phases = clearance.stop_phases(v, a, limit, 2000.0)
@@ -385,7 +386,7 @@ def test_the_stop_in_closed_form_is_ruckigs(limit):
 @pytest.mark.parametrize(
     "arm", [UR5E, load("one-joint"), chain(7)], ids=["ur5e", "one-joint", "seven joints"]
 )
-def test_a_stop_that_is_proved_clear_is_found_clear(arm):
+def test_a_stop_proved_clear_by_bounds_is_clear(arm):
     random = np.random.default_rng(7)
     model, joints = CollisionModel(arm, arm.payload), arm.joints
     proved = clear = 0
@@ -393,7 +394,7 @@ def test_a_stop_that_is_proved_clear_is_found_clear(arm):
         q, qd, qdd = random.uniform(-1, 1, (3, joints)) * [[2.0], [2.0], [9.0]]
         state, limit = Target(q, qd, qdd), float(random.choice([2.0, 9.0, 40.0]))
         spacious = model.stop_is_spacious(state, limit, 2000.0)
-        stop = JointStop(q, qd, qdd, acceleration=limit, jerk=2000.0, period=H)
+        stop = JointStop(q, qd, qdd, acceleration=limit, jerk=2000.0)
         free = all(model.meeting(stop.at(time)[0]) is None for time in np.linspace(0.0, stop.duration, 60))
         assert spacious <= free
         turned = np.abs(qd) * stop.duration + 0.01

@@ -73,7 +73,7 @@ messages = st.one_of(
 
 
 class Server:
-    """A robot in process, the lease on it, and whether what it says is sound."""
+    """A robot in process with its lease; its output is checked."""
 
     def __init__(self):
         self.host = LoopbackHost(setup(clock="lockstep"))
@@ -96,7 +96,7 @@ class Server:
         self.host.put_setpoint("fuzz", data)
 
     def looks(self):
-        """All that a refused command must not change."""
+        """Return everything that a refused command must not change."""
         controller = self.host.controller
         info = msgspec.msgpack.decode(self.host.info())
         lease = controller.session.lease
@@ -110,7 +110,7 @@ class Server:
         )
 
     def again(self):
-        """As new, with the counters going on."""
+        """Reset, except for the counters."""
         for command in (Stop(), SimulationReset(token=self.token, q=HOME, mode="RUNNING", shaper="zv")):
             self.host.request("fuzz", encode(command))
         self.host.entries.clear()
@@ -121,7 +121,7 @@ class Server:
         return reply.token
 
     def _hold_on(self):
-        """Have the lease again, where a message that was right gave it away."""
+        """Take the lease again if a valid message gave it away."""
         lease = self.host.controller.session.lease
         if lease is not None and lease.client != "fuzz":
             self.host.request("fuzz", encode(ReleaseControl(token=lease.token)))
@@ -140,13 +140,13 @@ def server():
 
 
 @pytest.mark.parametrize(
-    "count", [3_500, pytest.param(30_000, marks=[pytest.mark.nightly, pytest.mark.timeout(3600)])]
+    "count", [2_000, pytest.param(30_000, marks=[pytest.mark.nightly, pytest.mark.timeout(3600)])]
 )
-def test_every_message_is_answered_and_a_refused_one_changes_nothing(server, count):
+def test_every_message_gets_a_reply_and_refused_ones_change_nothing(server, count):
     @settings(
         max_examples=share(count // TOGETHER),
         deadline=None,
-        derandomize=count == 3_500,
+        derandomize=count == 2_000,
         phases=[Phase.generate],  # to make a sequence of twenty smaller takes minutes
         suppress_health_check=[
             HealthCheck.too_slow,
@@ -166,8 +166,8 @@ def test_every_message_is_answered_and_a_refused_one_changes_nothing(server, cou
     run()
 
 
-def test_a_flood_of_messages_leaves_nothing_behind(server):
-    """Memory after the second half of it is what it was after the first."""
+def test_a_flood_of_messages_leaks_no_memory(server):
+    """Memory after the last flood equals that after the one before."""
     sent = []
 
     @settings(max_examples=60, deadline=None, derandomize=True, database=None)

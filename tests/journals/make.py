@@ -23,7 +23,7 @@ MADE_ON = FOLDER / "made-on.txt"
 
 
 def processor():
-    """What the last bits depend on: the processor, and the libraries that choose their code by it."""
+    """Return what the last bits depend on: the processor, and libraries that select code for it."""
     features = sorted(name for name, there in binding.get_host_cpu_features().items() if there)
     libraries = [version(name) for name in ("numpy", "numba", "llvmlite", "pin", "ruckig")]
     names = ("OPENBLAS_CORETYPE", "NUMBA_CPU_NAME", "NUMBA_DISABLE_JIT")

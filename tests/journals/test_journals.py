@@ -20,10 +20,7 @@ from tvist_protocol.stream import Truth
 
 FOLDER = Path(__file__).parent
 RUNS = sorted(FOLDER.glob("*.mcap"))
-QUICK = (
-    "speeds", "tool_paths", "elastic_with_a_payload", "force_mode_in_contact", "cell_with_a_gripper", "live_stream",
-    "live_lost_lease",
-)  # fmt: skip
+QUICK = ("speeds", "tool_paths", "elastic_with_a_payload", "cell_with_a_gripper", "live_lost_lease")
 """Runs that are short, and different in what moves the arm."""
 OTHERS = [path.stem for path in RUNS if path.stem not in QUICK]
 POSITION = 1e-6
@@ -52,7 +49,7 @@ AS_MADE = MADE_ON.read_text(encoding="utf-8").strip() == processor()
 """Whether this processor computes as the one that made the runs did: then not a bit may differ."""
 
 
-def test_a_run_that_is_made_anew_has_what_clients_sent_and_what_the_robot_does(tmp_path):
+def test_a_remade_journal_has_the_same_inputs_and_events(tmp_path):
     before, made = FOLDER / "live_lost_lease.mcap", tmp_path / "made.mcap"
     make(before, made)
     old, new = read(before), read(made)
@@ -64,7 +61,7 @@ def test_a_run_that_is_made_anew_has_what_clients_sent_and_what_the_robot_does(t
 @pytest.mark.parametrize(
     "name", [*QUICK, *(pytest.param(name, marks=pytest.mark.nightly) for name in OTHERS)]
 )
-def test_a_recorded_run_comes_out_again(name):
+def test_recorded_runs_are_reproduced(name):
     content = read(FOLDER / f"{name}.mcap")
     again = replay_file(content)
     assert again.notes == []  # such as that a scene is another one now
@@ -77,8 +74,8 @@ def test_a_recorded_run_comes_out_again(name):
 
 
 @pytest.mark.nightly
-def test_what_is_compiled_for_any_processor_gives_the_same_bits(tmp_path):
-    """As in the wheels of `tvist-compiled`; all that is not compiled is the same."""
+def test_generic_kernels_give_the_same_bits(tmp_path):
+    """As in the wheels of `tvist-compiled`; everything that is not compiled is the same."""
     any_processor = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "", "NUMBA_CACHE_DIR": str(tmp_path)}
     run = [sys.executable, "-c", DIGEST, *map(str, RUNS)]
     here, there = (
@@ -89,7 +86,7 @@ def test_what_is_compiled_for_any_processor_gives_the_same_bits(tmp_path):
     assert there == here
 
 
-def test_a_run_of_another_behaviour_says_so():
+def test_a_journal_of_another_behaviour_number_adds_a_note():
     again = replay_file(replace(read(FOLDER / "live_lost_lease.mcap"), behaviour=1))
     assert any(f"is of behaviour 1, and this is {THIS_BEHAVIOUR}" in note for note in again.notes)
 
@@ -104,7 +101,7 @@ def compare(recorded, again, names, touched):
 
 
 def rounding(name, touched):
-    """By how much a value may differ, as a share of one more than it."""
+    """Return by how much a value may differ, relative to one more than its size."""
     if AS_MADE or touched:
         return 0.0 if AS_MADE else TOUCHED
     return next((most for end, most in ROUNDING.items() if name.endswith(end)), POSITION)

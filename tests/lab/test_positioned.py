@@ -53,7 +53,7 @@ async def test_an_arm_that_rings_stays_within_its_torques():
     plan = await planned(ring_downs=8)
     dynamics = InverseDynamics(ROBOT, body(plan.arm.payloads[0]))
     for jog in plan.jogs:
-        motion, way = quickest_motion(JointLine(jog.way[-1], jog.q), jog.limits, PERIOD), [jog.way[-1]]
+        motion, way = quickest_motion(JointLine(jog.way[-1], jog.q), jog.limits), [jog.way[-1]]
         while not motion.finished:
             way.append(motion.next())
         q = np.array(way)

@@ -33,7 +33,7 @@ def by_ticks(description, recipe, move, seed):
     )  # fmt: skip
     samples = [cycle.step() for _ in range(RESTING)]
     forces = [cycle.plant.truth().specific_force] * RESTING
-    cycle.begin(quickest_motion(JointLine(start, np.array(move.target)), PAPER, PERIOD))
+    cycle.begin(quickest_motion(JointLine(start, np.array(move.target)), PAPER))
     while not cycle.mode.at_rest:
         samples.append(cycle.step())
         forces.append(cycle.plant.truth().specific_force)

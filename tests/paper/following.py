@@ -14,8 +14,7 @@ import numpy as np
 
 from tvist_controller.api.line import DrivenLine, body, load_calibration, paper_payload
 from tvist_controller.planning.snapshot import FilterState
-from tvist_controller.safety.experience import AFTER, MotionRecord
-from tvist_controller.safety.payload_student import PayloadStudent
+from tvist_controller.safety.payload_learning import AFTER, MotionRecord, PayloadEstimator
 from tvist_controller.sources.mode_source import first_source
 from tvist_lab.study.line import PAPER, RESTING
 from tvist_lab.study.moves import draw_moves
@@ -111,7 +110,7 @@ def followed(seed, *, friction=True, masses=0.0, motions=2):
     arm = Arm.drawn(seed, friction=friction, masses=masses)
     moves = draw_moves(ROBOT, motions + 1, seed, (0.0, 5.0)).moves
     mass, believed = moves[0].mass, float(np.random.default_rng([seed, 5]).uniform(0.0, 5.0))
-    student, masses_believed = PayloadStudent(arm.known), [believed]
+    student, masses_believed = PayloadEstimator(arm.known), [believed]
     payload = paper_payload(ROBOT, believed)
     for number, move in enumerate(moves[:motions]):
         driven, own = Driven.of(arm.known, move, payload.mass), 10 * seed + number
@@ -141,7 +140,7 @@ def unchanged(seed, arms, *, draws=6, friction=True, masses=0.0):
         arm = Arm.drawn(1_000_003 * seed + number, friction=friction, masses=masses)
         response = driven.respond(arm, move.mass, 1000 * seed + number)
         for draw in range(draws):
-            student, random = PayloadStudent(known), np.random.default_rng([seed, number, draw])
+            student, random = PayloadEstimator(known), np.random.default_rng([seed, number, draw])
             sensors = 1.0 + 0.03 * random.uniform(-1.0, 1.0, known.joints)
             record = driven.recorded(response, sensors, int(random.integers(2**31)))
             lessons += student.study(record) is not None

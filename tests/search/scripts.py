@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from tests.search import space
 
-from tvist_controller.api.planning import Arm
+from tvist_controller.api.line import Arm
 
 Random = np.random.Generator
 MOST_STATEMENTS = 7  # number of statements of a program, at most

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from tests.search.subject import Subject
 
-from tvist_controller.api.planning import Arm, placement_vector, turned
+from tvist_controller.api.line import Arm, placement_vector, turned
 from tvist_protocol import motions as m
 from tvist_protocol.replies import Reply
 

@@ -137,7 +137,7 @@ class Subject:
 def torques(description, payload, references):
     """Torques of the rigid arm along references, one per tick, by central differences, shape (k - 2, n) [N m]."""
     dynamics = InverseDynamics(description, body(payload))
-    states = zip(*central_differences(references, PERIOD), strict=True)
+    states = zip(*central_differences(references), strict=True)
     return np.array([dynamics.torque(*state) for state in states])
 
 

@@ -29,7 +29,7 @@ GOOD = EXAMPLE.read_text(encoding="utf-8")
         ('model = "2F-85"', 'model = "2F-85"\ntool = "x"', "gripper.tool is 'x': must be one of 2F-85"),
         ('[gripper]\nmodel = "2F-85"', "", "parts need a gripper"),
         ("0.06, 0.05", "0.06, 0.09", "parts[0].size[1] is 0.09: must be less than 0.085 m"),
-        ('"box 2"', '"box 1"', "parts[1].name is 'box 1', which is the name of parts[0]"),
+        ('"box 2"', '"box 1"', "parts[1].name is 'box 1': must differ from the name of parts[0]"),
         ("mass = 0.4\n", "", "parts[0].mass is missing"),
         ("[-0.45, -0.3", "[nan, -0.3", "parts[0].pose[0] is NaN"),
         ("[[wires]]", "[[wires]", "not valid TOML"),

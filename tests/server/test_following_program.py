@@ -10,7 +10,7 @@ from tests.controller.robots import NoArm, Robot
 from tests.controller.scripts import URSIM
 from tests.examples import examples
 
-from tvist_controller.programs.checking import check_program
+from tvist_controller.programs.compiling import check_program
 from tvist_controller.programs.library import known_signatures
 from tvist_controller.programs.player import GUIDED
 from tvist_protocol.commands import UnlockProtectiveStop

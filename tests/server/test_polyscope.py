@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from tests.server.polyscope_files import contributed, expression, move, saved, waypoint
 
-from tvist_controller.programs.checking import check_program
+from tvist_controller.programs.compiling import check_program
 from tvist_plant.user_file import UserFileError, xml
 from tvist_server.polyscope.contributed import EXTERNAL_CONTROL
 from tvist_server.polyscope.files import read_program, text_of

@@ -8,7 +8,7 @@ import threading
 import pytest
 
 from tvist_controller.kinematics import arm
-from tvist_controller.safety import payload_student
+from tvist_controller.safety import payload_learning
 from tvist_plant.description import load
 from tvist_server import punctual
 
@@ -47,5 +47,5 @@ def test_slow_work_runs_on_other_processors_than_the_tick_thread():
 def test_compiled_code_is_loaded_before_the_first_tick(monkeypatch):
     compiled, called = arm.torques_of, []
     monkeypatch.setattr(arm, "torques_of", lambda *given: called.append(given) or compiled(*given))
-    payload_student.PayloadStudent(load("ur5e"))
+    payload_learning.PayloadEstimator(load("ur5e"))
     assert called

@@ -28,10 +28,10 @@ class AnyTorque:
 
 def commands():
     """What the drives get in a motion from Q1 to Q3, and while the arm rests before and after it."""
-    motion, q = quickest_motion(JointLine(Q1, Q3), MotionLimits(1.5, 2.0, 100.0), PERIOD), [Q1] * 5
+    motion, q = quickest_motion(JointLine(Q1, Q3), MotionLimits(1.5, 2.0, 100.0)), [Q1] * 5
     while not motion.finished:
         q.append(motion.next())
-    q, qd, _ = central_differences(np.array([*q, *[q[-1]] * 300]), PERIOD)
+    q, qd, _ = central_differences(np.array([*q, *[q[-1]] * 300]))
     return [DriveCommand(*both, np.zeros(6)) for both in zip(q, qd, strict=True)]
 
 
@@ -39,7 +39,7 @@ def errors(lag, lookahead=LOOKAHEAD, gain=GAIN):
     """Distance of the arm from where it is wanted at each tick [rad]."""
     motion = commands()
     start = motion[0].q
-    servo = ServoFollower((start, 0.0 * start, 0.0 * start), arm_limits(UR5E), REACH, AnyTorque(), PERIOD)
+    servo = ServoFollower((start, 0.0 * start, 0.0 * start), arm_limits(UR5E), REACH, AnyTorque())
     setpoints, apart = ServoSetpoints(start, lag, fastest=FAST, reach=REACH), []
     for command in motion:
         servo.aim(setpoints.next(command), lookahead, gain)
@@ -96,11 +96,11 @@ def test_no_set_point_is_beyond_the_range_or_steps_further_than_permitted_and_re
 def test_a_motion_at_the_end_of_a_joint_s_range_sends_nothing_beyond_it():
     """Where the arm brakes hard, what leads it would otherwise go beyond its end for a moment."""
     end = REACH.copy()
-    motion = quickest_motion(JointLine(end - 0.5, end), MotionLimits(3.0, 20.0, 2000.0), PERIOD)
+    motion = quickest_motion(JointLine(end - 0.5, end), MotionLimits(3.0, 20.0, 2000.0))
     q = [end - 0.5] * 2
     while not motion.finished:
         q.append(motion.next())
-    q, qd, _ = central_differences(np.array([*q, *[end] * 50]), PERIOD)
+    q, qd, _ = central_differences(np.array([*q, *[end] * 50]))
     setpoints = ServoSetpoints(q[0], ServoLag.simulated(), fastest=FAST, reach=REACH)
     sent = np.array([setpoints.next(DriveCommand(*both, np.zeros(6))) for both in zip(q, qd, strict=True)])
     assert sent.max() <= REACH.max()

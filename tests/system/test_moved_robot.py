@@ -249,7 +249,7 @@ def test_commands_the_robot_cannot_follow_and_a_second_bridge_are_refused(arm, b
         for command, words in (
             (lambda: control.set_shaper("elastic"), "takes positions only"),
             (lambda: control.set_digital_output(0, True), "only set-points are sent"),
-            (lambda: control.set_payload(1.0, (0.0, 0.0, 0.0), (0.0,) * 6), "tell it first"),
+            (lambda: control.set_payload(1.0, (0.0, 0.0, 0.0), (0.0,) * 6), "change it there first"),
         ):
             with pytest.raises(RefusedError, match=words):
                 command()

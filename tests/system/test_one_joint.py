@@ -15,7 +15,7 @@ def test_it_takes_the_names_of_its_own_poses_and_is_recorded_analyzed_and_replay
         at = ("--endpoint", served.endpoint)
         assert "2 joints" in tvist("check", served.endpoint).assert_done().out
         refused = tvist("move", "0,-3,0,-1.5,0,0", *at)
-        refused.assert_failed(1, "q has 6 angles; the arm has 2")
+        refused.assert_failed(1, "q has 6 values: must be 2")
         for pose in ("Q3", "q1"):
             assert "moved to" in tvist("move", pose, *at).assert_done().out
         with Wire(served.endpoint) as wire, wire.control() as token:

@@ -15,8 +15,7 @@ from tvist_controller.instruments.report import Sink
 from tvist_controller.planning.plan import Plan
 from tvist_controller.planning.snapshot import PlanningState
 from tvist_controller.programs.sockets import SocketNews
-from tvist_controller.safety.experience import Experience
-from tvist_controller.safety.payload_student import experience_of
+from tvist_controller.safety.payload_learning import PayloadLearning, payload_learning_of
 from tvist_controller.setup import Setup
 from tvist_plant.plant import Plant, RealArm
 from tvist_protocol.codec import encode
@@ -90,9 +89,9 @@ class ServedRobot:
         sinks: list[Sink] = [] if self.recorder is None else [self.recorder]
         sinks += [] if observe is None else [observe(self.controller)]
         self.sockets = ProgramSockets(self._hear, self.warn, hosts or AllowedHosts(()))
-        experience = self._studies(setup) if self._realtime and setup.adapt else experience_of(setup)
+        learning = self._studies(setup) if self._realtime and setup.adapt else payload_learning_of(setup)
         self.host = Host(
-            self.controller, *sinks, black_box, self.publisher, ports=self.sockets, experience=experience,
+            self.controller, *sinks, black_box, self.publisher, ports=self.sockets, learning=learning,
             survives=True,
         )  # fmt: skip
         plant = self.controller.cycle.plant  # the default plant if the setup has none
@@ -129,11 +128,11 @@ class ServedRobot:
         self._threads.append(thread)
         return lambda command, now: thread.submit(planner.plan, command, now).result
 
-    def _studies(self, setup: Setup) -> Experience | None:
+    def _studies(self, setup: Setup) -> PayloadLearning | None:
         """Return what studies motions one at a time; the robot takes a lesson at a tick that its journal records."""
         planner, thread = Planner(setup), background("tvist-studies")
         self._threads.append(thread)
-        return experience_of(setup, lambda work: thread.submit(work).done, planner.for_lesson)
+        return payload_learning_of(setup, lambda work: thread.submit(work).done, planner.for_lesson)
 
     def open(self, gateways: Sequence[Gateway]) -> None:
         """Set this robot's own gateways, which get its messages and are closed with it."""

@@ -3,6 +3,7 @@
 import ast
 
 from tvist_urscript import tree
+from tvist_urscript.failures import TooDeep
 from tvist_urscript.names import Scope
 from tvist_urscript.pieces import DEPTH, MISSING, assign, branch, call, charge, compare, located, name
 from tvist_urscript.statements import Statements
@@ -15,6 +16,11 @@ MOST_STATEMENTS = 4000
 MOST_NODES = 10_000  # most operations, names, calls and statements of one function, for the same reason
 PART, PART_NODES = 200, 1000
 """Largest part of a long main function, in statements and in the nodes that MOST_NODES counts."""
+
+
+def too_deep() -> None:
+    """End the program where a function is called too deep."""
+    raise TooDeep(f"functions are called more than {DEEPEST_CALLS} deep")
 
 
 class Functions(Statements):

@@ -7,12 +7,12 @@ from types import FrameType
 from typing import Any
 
 from tvist_urscript.errors import Fault, ScriptError
-from tvist_urscript.failures import FILE, TooDeep, all_lines_of, failure, line_of, name_of, position_of
-from tvist_urscript.functions import DEEPEST_CALLS
+from tvist_urscript.failures import FILE, all_lines_of, failure, line_of, name_of, position_of
+from tvist_urscript.functions import too_deep
 from tvist_urscript.namespace import Namespace
 from tvist_urscript.pieces import HERE, MISSING
 from tvist_urscript.script import Script
-from tvist_urscript.threads import MOST_THREADS, Thread
+from tvist_urscript.threads import MOST_THREADS, CriticalSection, Halted, Killed, Thread, halt
 from tvist_urscript.values import Value
 
 EVALUATIONS = 2000
@@ -23,14 +23,6 @@ OVERDRAFT = 2000  # most evaluations by which one statement may exceed the budge
 
 _MISSING = object()
 Steps = Generator[Any, None, Any]
-
-
-class Halted(Exception):  # noqa: N818  no error: the script has executed `halt`
-    """Raised by `halt` to unwind the running thread; the machine then ends all threads."""
-
-
-class Killed(Exception):  # noqa: N818  no error: the script has killed the thread that runs
-    """Raised to unwind the running thread if it has killed itself or one of its ancestors."""
 
 
 class Machine:
@@ -60,14 +52,11 @@ class Machine:
         finish: Callable[[], Steps] | None = None,
     ) -> None:
         self.script = script
-        self.left = 0
-        self.thread = 0
-        self.halted = False
+        self.left = self.thread = self._started = 0
+        self.halted = self._held = False
         self.label: tuple[int, str] | None = None
-        self._held = False
         self._finish = finish or _nothing
-        self._started = 0
-        self._holder: Thread | None = None
+        self._critical = CriticalSection()
         self._line = 1
         called = {
             HERE: self,
@@ -77,13 +66,12 @@ class Machine:
             "join": self._join,
             "enter_critical": self._enter,
             "exit_critical": self._exit,
-            "halt": _halt,
+            "halt": halt,
             "label": self._label,
-            "too_deep": _too_deep,
+            "too_deep": too_deep,
         }
         self._names = Namespace(script, functions, self.charge, called)
-        self._main = Thread(0, self._body(self._names[script.main]), None)
-        self._running = self._main
+        self._main = self._running = Thread(0, self._body(self._names[script.main]), None)
         self._threads: list[Thread] = [self._main]
         self._missed: list[Thread] = []
         self._turns: list[Thread] = []
@@ -152,7 +140,7 @@ class Machine:
             if thread.ended:
                 continue
             short = self._held or self.left <= 0 or self.left < min(thread.owes, budget)
-            if short or not self._may_enter(thread):
+            if short or not self._critical.admits(thread):
                 self._missed.append(thread)
             else:
                 self._turn(thread)
@@ -211,8 +199,7 @@ class Machine:
 
     def _step(self, thread: Thread) -> None:
         assert thread.steps is not None
-        self._running = thread
-        self.thread = thread.number
+        self._running, self.thread = thread, thread.number
         before = self.left
         self.left -= thread.owes
         thread.owes = 0
@@ -233,7 +220,7 @@ class Machine:
         """
         if cost is None:
             thread.spent = 0
-            self._hand_over(thread)
+            self._critical.release(thread)
             return
         thread.owes = cost
         thread.spent += before - (self.left + cost)
@@ -246,19 +233,9 @@ class Machine:
                 f"an endless loop: the thread has computed {PATIENCE} evaluations without waiting for time to pass",
             )
 
-    def _may_enter(self, thread: Thread) -> bool:
-        if thread.critical and self._holder is None:
-            self._holder = thread
-        return not thread.critical or self._holder is thread
-
-    def _hand_over(self, thread: Thread) -> None:
-        """Let other threads enter critical sections, if this one is in its own."""
-        if self._holder is thread:
-            self._holder = None
-
     def _ended(self, thread: Thread) -> None:
         thread.leave(self._threads)
-        self._hand_over(thread)
+        self._critical.release(thread)
         if thread is self._main:
             self.end()
         elif thread in self._threads:
@@ -267,7 +244,7 @@ class Machine:
     def _close(self, thread: Thread) -> None:
         steps = thread.steps
         thread.leave(self._threads)
-        self._hand_over(thread)
+        self._critical.release(thread)
         if steps is not None and (thread is not self._running or not getattr(steps, "gi_running", False)):
             steps.close()
 
@@ -356,19 +333,13 @@ class Machine:
 
     def _enter(self) -> Steps:
         thread = self._running
-        if self._holder is not None and self._holder is not thread:
+        if self._critical.taken_from(thread):
             yield from self._finish()  # before it queues, since it then gets no turn
-        thread.critical += 1
-        if self._holder is None:
-            self._holder = thread
-        elif self._holder is not thread:
+        if not self._critical.enter(thread):
             yield
 
     def _exit(self) -> None:
-        thread = self._running
-        thread.critical = max(thread.critical - 1, 0)
-        if not thread.critical:
-            self._hand_over(thread)
+        self._critical.leave(self._running)
 
     def _label(self, number: int, name: str) -> None:
         if self._running is self._main:
@@ -377,11 +348,3 @@ class Machine:
 
 def _nothing() -> Steps:
     yield from ()
-
-
-def _halt() -> None:
-    raise Halted
-
-
-def _too_deep() -> None:
-    raise TooDeep(f"functions are called more than {DEEPEST_CALLS} deep")

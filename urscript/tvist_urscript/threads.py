@@ -7,6 +7,19 @@ from typing import Any
 MOST_THREADS = 100  # most threads of a program at the same time
 
 
+class Halted(Exception):  # noqa: N818  no error: the script has executed `halt`
+    """Raised by `halt` to unwind the running thread; the machine then ends all threads."""
+
+
+class Killed(Exception):  # noqa: N818  no error: the script has killed the thread that runs
+    """Raised to unwind the running thread if it has killed itself or one of its ancestors."""
+
+
+def halt() -> None:
+    """End all threads of the program."""
+    raise Halted
+
+
 @dataclass(eq=False)
 class Thread:
     """A thread of a script."""
@@ -43,3 +56,36 @@ class Thread:
         for other in others:
             if other.parent is self:
                 other.parent = self.parent
+
+
+class CriticalSection:
+    """The critical section of a program: its holder keeps it until it leaves, or waits for time to pass."""
+
+    def __init__(self) -> None:
+        self._holder: Thread | None = None
+
+    def admits(self, thread: Thread) -> bool:
+        """Return whether a thread may run; one inside the section takes it if it is free."""
+        if thread.critical and self._holder is None:
+            self._holder = thread
+        return not thread.critical or self._holder is thread
+
+    def taken_from(self, thread: Thread) -> bool:
+        """Return whether another thread holds the section."""
+        return self._holder is not None and self._holder is not thread
+
+    def enter(self, thread: Thread) -> bool:
+        """Put a thread inside; return whether it may run on."""
+        thread.critical += 1
+        return self.admits(thread)
+
+    def leave(self, thread: Thread) -> None:
+        """Take a thread out, once for each `enter`."""
+        thread.critical = max(thread.critical - 1, 0)
+        if not thread.critical:
+            self.release(thread)
+
+    def release(self, thread: Thread) -> None:
+        """Let others in if this thread holds the section."""
+        if self._holder is thread:
+            self._holder = None

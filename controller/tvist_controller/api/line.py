@@ -1,11 +1,12 @@
-"""The control line for studies: the blocks of Figure 6, their parameters, and joint motions."""
+"""The control line for studies: the blocks of Figure 6, their parameters, joint motions, the tool's pose."""
 
 from tvist_controller.foresight.collision import CLEARANCE, CollisionModel
 from tvist_controller.foresight.stops import resting_after
+from tvist_controller.kinematics.arm import Arm, InverseDynamics
+from tvist_controller.kinematics.pose import placement_vector, turned
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.differentiator import STILL, central_differences
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
-from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.line.limits import REBOUND, TORQUE_SHARE, acceleration_on_way
 from tvist_controller.line.whole_motion import Driven, DrivenLine, respond
 from tvist_controller.planning.filter_planner import choose_filter, wanted_modes
@@ -31,6 +32,7 @@ __all__ = [
     "REBOUND",
     "STILL",
     "TORQUE_SHARE",
+    "Arm",
     "CollisionModel",
     "ControlCycle",
     "Driven",
@@ -60,8 +62,10 @@ __all__ = [
     "mass_matrix",
     "modal_estimator",
     "paper_payload",
+    "placement_vector",
     "quickest_motion",
     "respond",
     "resting_after",
+    "turned",
     "wanted_modes",
 ]

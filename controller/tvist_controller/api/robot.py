@@ -9,7 +9,7 @@ from tvist_controller.loopback import LoopbackHost
 from tvist_controller.motion.setpoints import Unreadable
 from tvist_controller.programs.compiling import ScriptCompiler
 from tvist_controller.programs.sockets import SocketNews
-from tvist_controller.safety.payload_student import experience_of
+from tvist_controller.safety.payload_learning import payload_learning_of
 from tvist_controller.sources.own_plants import WORLD, OwnPlant, RecordedPlant, load_plant
 
 __all__ = [
@@ -24,8 +24,8 @@ __all__ = [
     "Sink",
     "SocketNews",
     "Unreadable",
-    "experience_of",
     "info_of",
     "load_plant",
+    "payload_learning_of",
     "truth_of",
 ]

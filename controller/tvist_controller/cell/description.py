@@ -124,7 +124,7 @@ class Cell(_Table, frozen=True, kw_only=True):
         """Check what the types of the fields cannot express."""
         for number, first in _repeated([wire.input for wire in self.wires]):
             wired = self.wires[number].input
-            raise ValueError(f"wires[{number}].input is {wired!r}, which has a wire: that of wires[{first}]")
+            raise ValueError(f"wires[{number}].input is {wired!r}: must differ from that of wires[{first}]")
         self._check_tools()
         _check_names("tools", [tool.name for tool in self.tools])
         _check_names("parts", [part.name for part in self.parts])
@@ -144,8 +144,8 @@ class Cell(_Table, frozen=True, kw_only=True):
         for number, part in enumerate(self.parts):
             if part.size[1] >= self.gripper.stroke:
                 raise ValueError(
-                    f"parts[{number}].size[1] is {part.size[1]:g}: must be less than {self.gripper.stroke:g} m, by "
-                    f"which a {self.gripper.model} opens"
+                    f"parts[{number}].size[1] is {part.size[1]:g}: must be less than {self.gripper.stroke:g} m, "
+                    f"the opening of a {self.gripper.model}"
                 )
 
     def _check_tools(self) -> None:
@@ -175,8 +175,8 @@ def _repeated(names: Sequence[str]) -> list[tuple[int, int]]:
 def _check_names(key: str, names: Sequence[str]) -> None:
     for number, first in _repeated(names):
         raise ValueError(
-            f"{key}[{number}].name is {names[first]!r}, which is the name of {key}[{first}], too"
+            f"{key}[{number}].name is {names[first]!r}: must differ from the name of {key}[{first}]"
         )
     for number, name in enumerate(names):
         if not name.isprintable():
-            raise ValueError(f"{key}[{number}].name is {name!r}: must be characters that can be shown")
+            raise ValueError(f"{key}[{number}].name is {name!r}: must be printable characters")

@@ -22,8 +22,7 @@ FORCES = {0.085: (20.0, 235.0), 0.14: (10.0, 125.0)}
 MOVING, STOPPED_CLOSING, ARRIVED = 0, 2, 3  # values of OBJ
 WRITABLE: Mapping[str, int] = MappingProxyType(
     {"ACT": 1, "GTO": 1, "ATR": 1, "ARD": 1, "POS": 255, "SPE": 255, "FOR": 255, "MOD": 1, "MSC": 255}
-)
-"""Writable registers and their largest values."""
+)  # writable registers and their largest values
 
 PORT: Final = 63352  # TCP port on which the URCap listens
 SLAVES = ("9", "1")  # SID values by which clients select the only gripper

@@ -7,11 +7,11 @@ from typing import Protocol
 import numpy as np
 import pinocchio as pin
 
-from tvist_controller.cell.description import Cell, CellWire, Tool, Workpiece, bit_of
+from tvist_controller.cell.description import Cell, CellWire, Tool, bit_of
 from tvist_controller.cell.gripper import PORT, Gripper, answer
 from tvist_controller.events import Emit
 from tvist_controller.kinematics.arm import Arm
-from tvist_controller.paths.poses import Placement, placement
+from tvist_controller.kinematics.pose import Placement, placement
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import Floats, payload_inertia
 from tvist_plant.plant import Plant
@@ -89,8 +89,7 @@ class LiveCell:
         self._kinematics = Arm(description)
         self.gripper = (
             None if cell.gripper is None else Gripper(cell.gripper.stroke, activated=cell.gripper.activated)
-        )
-        """The gripper; None for none."""
+        )  # the gripper; None for none
         tool = cell.gripping_tool
         self._tcp = placement(None if tool is None else tool.tcp)
         self._changers = [(bit_of(tool.while_on), tool) for tool in cell.tools[1:] if tool.while_on]
@@ -163,8 +162,7 @@ class LiveCell:
         def meet(_: float, narrow: float) -> float | None:
             return opening if opening - narrow > STALLED else None
 
-        moved = gripper.tick(meet)
-        if moved.gripped:
+        if gripper.tick(meet).gripped:
             self._emit("text", why=f"cell: the gripper holds something {1e3 * opening:.1f} mm wide")
         hand.grip(0.0 if gripper.holds else gripper.opening, gripper.grip_force)
 
@@ -201,7 +199,9 @@ class LiveCell:
     def _pick_up(self, number: int, q: Floats) -> None:
         part = self._cell.parts[number]
         self._grip = self._flange(q).inverse @ self._places[number]
-        self._held, self._part, self._share = number, _part_body(part, self._grip), 0
+        own = payload_inertia(Payload(mass=part.mass, com=part.cog, inertia=part.inertia))
+        carried = _payload(pin.SE3(self._grip.rotation, self._grip.position).act(own))
+        self._held, self._part, self._share = number, carried, 0
         self._emit("text", why=f"cell: the gripper holds {part.name} ({part.mass:g} kg)")
 
     def _put_down(self, q: Floats) -> None:
@@ -227,11 +227,6 @@ class LiveCell:
             why=f"the gripper closed on nothing: {name} lies {1e3 * distance:.1f} mm and {angle:.2f} rad from the tool "
             f"centre point; it is gripped within {1e3 * limits.tolerance:g} mm and {limits.angle_tolerance:g} rad",
         )
-
-
-def _part_body(part: Workpiece, place: Placement) -> Payload:
-    own = Payload(mass=part.mass, com=part.cog, inertia=part.inertia)
-    return _payload(pin.SE3(place.rotation, place.position).act(payload_inertia(own)))
 
 
 def _joined(tool: Payload, part: Payload, share: float) -> Payload:

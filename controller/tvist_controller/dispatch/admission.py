@@ -97,7 +97,7 @@ def _authorize(command: Command, lease: Lease | None, clock: Lease | None) -> st
 def _check_envelope(envelope: Envelope, size: int, lease: Lease | None, clock: Lease | None) -> None:
     if envelope.type not in LONG:
         of = "message" if envelope.type is None else f"{envelope.type:.40}"
-        why = f"the {of} has {size} bytes, at most {EXPLAINED_BYTES} are allowed"
+        why = f"the {of} has {size} bytes: must be at most {EXPLAINED_BYTES}"
         raise ProtocolError("malformed", "", why, EXPLAINED_BYTES)
     if envelope.token is None:
         raise ProtocolError("missing_field", "token", "token is missing")

@@ -5,7 +5,7 @@ from typing import Any
 
 from tvist_controller.events import Emit
 from tvist_controller.instruments.peripherals import Peripherals
-from tvist_controller.line.inverse_dynamics import SLEW
+from tvist_controller.kinematics.arm import SLEW
 from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.planning.filter_planner import FilterChoice
 from tvist_controller.planning.plan import Plan

@@ -27,8 +27,7 @@ from tvist_protocol import commands as c
 from tvist_protocol import forces as f
 from tvist_protocol import motions as m
 from tvist_protocol.channels import tag
-from tvist_protocol.motions import JointSegment, MoveC, MoveL, MovePath
-from tvist_protocol.replies import Accepted, Reply
+from tvist_protocol.replies import Accepted, Code, Reply
 from tvist_protocol.transitions import Activity
 
 _STRAIGHT = Planning(MOTION, MovePlanner, MovePlanner.move, partial(MovePlanner.move, at_once=True))
@@ -44,14 +43,14 @@ def _check_move(command: c.MoveJ, description: RobotDescription) -> None:
     _check_limits(command, description)
 
 
-def _check_tool_move(command: MoveL | MoveC, _: RobotDescription) -> None:
+def _check_tool_move(command: m.MoveL | m.MoveC, _: RobotDescription) -> None:
     check_pace(command.velocity, command.acceleration, command.jerk)
 
 
-def _check_path(command: MovePath, description: RobotDescription) -> None:
+def _check_path(command: m.MovePath, description: RobotDescription) -> None:
     for number, segment in enumerate(command.segments):
         where = f"segments[{number}]."
-        if isinstance(segment, JointSegment):
+        if isinstance(segment, m.JointSegment):
             check_joints(segment.q, description, f"{where}q")
             check_motion(
                 segment.velocity, segment.acceleration, min(description.limits.jerk), description, where
@@ -143,9 +142,8 @@ def _force_mode(robot: RobotParts, command: f.ForceMode) -> int:
 
 def _end_force_mode(robot: RobotParts, _: CommandCall[f.EndForceMode]) -> None:
     if robot.guidance.compliant is None:
-        why = "neither force_mode nor freedrive is on"
-        guided = robot.motion.activity is Activity.GUIDED
-        raise RefusalError("busy" if guided else "wrong_mode", "", why)
+        code: Code = "busy" if robot.motion.activity is Activity.GUIDED else "wrong_mode"
+        raise RefusalError(code, "", "neither force_mode nor freedrive is on: there is nothing to end")
     robot.force_control.end()
 
 
@@ -156,9 +154,9 @@ def _zero(robot: RobotParts, _: CommandCall[f.ZeroFtsensor]) -> None:
 
 ROWS: tuple[CommandRow, ...] = (
     CommandRow(c.MoveJ, _move, check=_check_move, plan=_STRAIGHT),
-    CommandRow(MoveL, _move, check=_check_tool_move, plan=_ALONG_PATH),
-    CommandRow(MoveC, _move, check=_check_tool_move, plan=_ALONG_PATH),
-    CommandRow(MovePath, _move, check=_check_path, plan=_ALONG_PATH, long=True),
+    CommandRow(m.MoveL, _move, check=_check_tool_move, plan=_ALONG_PATH),
+    CommandRow(m.MoveC, _move, check=_check_tool_move, plan=_ALONG_PATH),
+    CommandRow(m.MovePath, _move, check=_check_path, plan=_ALONG_PATH, long=True),
     CommandRow(c.ServoStart, _servo_start, check=_check_limits),
     CommandRow(c.ServoStop, lambda robot, _: robot.motion.end_stream()),
     CommandRow(c.Stop, _stop, lease="if named", stops=True),

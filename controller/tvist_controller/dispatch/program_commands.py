@@ -4,7 +4,7 @@ from tvist_controller.dispatch.robot import RobotParts
 from tvist_controller.planning.plan import CommandCall, CommandRow, Planning
 from tvist_controller.planning.snapshot import SCRIPT
 from tvist_controller.programs.compiling import Kept, ScriptCompiler
-from tvist_controller.refusal import RefusalError, out_of_turn
+from tvist_controller.refusal import RefusalError, out_of_turn, wrong_mode
 from tvist_protocol import programs as p
 from tvist_protocol.modes import RobotMode
 from tvist_protocol.replies import Accepted
@@ -27,8 +27,10 @@ def _load(robot: RobotParts, call: CommandCall[p.ProgramLoad]) -> None:
 
 
 def _run(robot: RobotParts, call: CommandCall[p.ProgramRun]) -> None:
-    script = call.planned()
-    _check_power(robot, "program.run")
+    script, activity = call.planned(), robot.motion.activity
+    if activity.robot_mode is not RobotMode.RUNNING or activity.protective:
+        raise out_of_turn("program.run", activity)
+    robot.motion.safety.check("move_j", activity)
     if script.secondary:
         robot.programs.play_beside(script, call.origin)
     else:
@@ -39,9 +41,9 @@ def _run(robot: RobotParts, call: CommandCall[p.ProgramRun]) -> None:
 def _play(robot: RobotParts, call: CommandCall[p.ProgramPlay]) -> None:
     programs, motion = robot.programs, robot.motion
     if programs.loaded is None:
-        raise RefusalError("wrong_mode", "", "no program is loaded: send program.load first")
+        raise wrong_mode("no program is loaded: send program.load first")
     if programs.state == "PLAYING":
-        raise RefusalError("busy", "", f"program {programs.name} is playing")
+        raise RefusalError("busy", "", f"program {programs.name} is playing: stop it first")
     if programs.state == "PAUSED" and motion.activity is Activity.PAUSED:
         motion.resume()
     else:
@@ -55,7 +57,7 @@ def _play(robot: RobotParts, call: CommandCall[p.ProgramPlay]) -> None:
 
 def _pause(robot: RobotParts, _: CommandCall[p.ProgramPause]) -> None:
     if robot.programs.state != "PLAYING":
-        raise RefusalError("wrong_mode", "", "no program is playing: there is nothing to pause")
+        raise wrong_mode("no program is playing: there is nothing to pause")
     robot.programs.hold()
 
 
@@ -63,14 +65,6 @@ def _stop(robot: RobotParts, _: CommandCall[p.ProgramStop]) -> None:
     why = "the program was stopped"
     robot.programs.end(why)
     robot.motion.stop(None, why)
-
-
-def _check_power(robot: RobotParts, command: str) -> None:
-    """Refuse to start a program without power or in a protective stop."""
-    activity = robot.motion.activity
-    if activity.robot_mode is not RobotMode.RUNNING or activity.protective:
-        raise out_of_turn(command, activity)
-    robot.motion.safety.check("move_j", activity)
 
 
 ROWS: tuple[CommandRow, ...] = (

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from tvist_controller.events import Emit
-from tvist_controller.refusal import RefusalError
+from tvist_controller.refusal import wrong_mode
 from tvist_protocol.replies import Code, Refused
 from tvist_protocol.simulation import SimulationStep
 
@@ -39,7 +39,7 @@ CONTROL = _Words(
 CLOCK = _Words(
     "no client holds the clock: send take_clock first",
     "the clock",
-    "the clock is held by {!r} until it releases it",
+    "the clock is held by {!r}: wait until it releases it",
     "client",
 )
 
@@ -200,8 +200,7 @@ class Authority:
 
     def _check_steppable(self) -> None:
         if self._realtime:
-            why = "the robot runs in real time: start it with --clock lockstep to step"
-            raise RefusalError("wrong_mode", "type", why)
+            raise wrong_mode("the robot runs in real time: start it with --clock lockstep to step", "type")
 
 
 class Presence:

@@ -15,18 +15,17 @@ from tvist_controller.instruments.peripherals import Peripherals
 from tvist_controller.instruments.report import Report, truth_of
 from tvist_controller.instruments.tool_forces import ToolForces
 from tvist_controller.line.cycle import ControlCycle
-from tvist_controller.line.sample import Sample
+from tvist_controller.line.line_tick import Sample
 from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.motion.force_control import ForceControl
 from tvist_controller.motion.guidance import Guidance
-from tvist_controller.motion.monitor import Monitor
+from tvist_controller.motion.monitors import Monitor, ShaperMonitor, TorqueOverload
 from tvist_controller.planning.filter_planner import FilterChoice
 from tvist_controller.planning.plan import MakesPlans, Order, Plan, Plans
 from tvist_controller.planning.snapshot import PlanningState
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.player import ProgramPlayer
 from tvist_controller.safety.faults import Faults
-from tvist_controller.safety.monitors import ShaperMonitor, TorqueOverload
 from tvist_controller.safety.own_controller import Supervision, Watching
 from tvist_controller.safety.robot_modes import RobotModes
 from tvist_controller.safety.safety_control import SafetyControl

@@ -6,11 +6,12 @@ import numpy as np
 
 from tvist_controller.dispatch import motion_commands, program_commands
 from tvist_controller.dispatch.robot import RobotParts
+from tvist_controller.foresight.collision import CLEARANCE
 from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.planning.plan import CommandCall, CommandRow, Planning
 from tvist_controller.planning.reachable import Reachable
 from tvist_controller.planning.snapshot import FILTER, TOOL
-from tvist_controller.refusal import RefusalError, check_body, check_joints
+from tvist_controller.refusal import RefusalError, check_body, check_joints, out_of_range, wrong_mode
 from tvist_controller.safety.faults import check_fault
 from tvist_controller.setup import body, payload_of
 from tvist_plant.description import RobotDescription
@@ -27,8 +28,8 @@ from tvist_protocol.values import PROTOCOL_VERSION
 
 def _check_version(command: c.TakeControl | c.TakeClock, _: RobotDescription) -> None:
     if command.protocol != PROTOCOL_VERSION:
-        why = f"protocol is {command.protocol}; this server speaks {PROTOCOL_VERSION}"
-        raise RefusalError("unsupported_version", "protocol", why, PROTOCOL_VERSION)
+        must = f"{PROTOCOL_VERSION}, the version of this server"
+        raise out_of_range("protocol", command.protocol, must, PROTOCOL_VERSION, "unsupported_version")
 
 
 def _take_control(robot: RobotParts, call: CommandCall[c.TakeControl]) -> Reply:
@@ -58,10 +59,6 @@ _RIGHTS = (
 # ---------------------------------------------------------------------- filter, payload, terminals
 
 
-def _check_payload(command: c.SetPayload, description: RobotDescription) -> None:
-    check_body(payload_of(command), rated=description.limits.payload)
-
-
 def _filter(make: Any) -> Planning:
     """Return a plan of the filter planner, from the command and the present filter's state."""
     return Planning(FILTER, FilterPlanner, lambda planner, command, now: make(planner, command, now.filter))
@@ -89,7 +86,7 @@ _SETTINGS = (
         c.SetPayload,
         lambda robot, call: robot.assumed.declare(call.command, call.planned()),
         changes_io=True,
-        check=_check_payload,
+        check=lambda command, arm: check_body(payload_of(command), rated=arm.limits.payload),
         plan=_filter(lambda planner, command, now: planner.with_payload(payload_of(command), now)),
     ),
     CommandRow(
@@ -129,7 +126,7 @@ def _place(robot: RobotParts, call: CommandCall[SimulationReset]) -> Reply:
     command, chosen, cycle = call.command, call.planned(), robot.cycle
     plant, motion, cell = cycle.plant, robot.motion, robot.cell
     if not isinstance(plant, SimulatedArm):
-        why = f"the plant {type(plant).__name__} cannot be put anywhere: it has no reset"
+        why = f"the plant {type(plant).__name__} cannot be placed: it has no method reset"
         raise RefusalError("unknown_type", "type", why)
     q = cycle.position if command.q is None else np.array(command.q, dtype=float)
     carried = None if command.payload is None else body(command.payload)
@@ -139,10 +136,12 @@ def _place(robot: RobotParts, call: CommandCall[SimulationReset]) -> Reply:
     if command.q is not None:
         placed = [motion.collisions.declared, *(placed or [plant.payload])]
     blamed = "payload" if command.q is None and command.payload is not None else "q"
-    motion.collisions.check_place(q, placed, blamed)
-    met = plant.obstacle(q, carried)
+    met = motion.collisions.misplaced(q, *placed)
+    limit = None if met is None else CLEARANCE
+    met = met or plant.obstacle(q, carried)
     if met is not None:
-        raise RefusalError("collision", blamed, f"{met}: choose a posture in which the arm is clear")
+        why = f"{met}: choose a posture in which the arm and its payload are clear"
+        raise RefusalError("collision", blamed, why, limit)
     robot.programs.end("simulation.reset")
     motion.abandon("simulation.reset")
     robot.faults.clear()
@@ -169,12 +168,10 @@ def _check_step(robot: RobotParts, call: CommandCall[SimulationStep]) -> Reply:
     command = call.command
     robot.session.check_step(command, call.now)
     if command.setpoints is not None and not robot.motion.streaming:
-        raise RefusalError("wrong_mode", "setpoints", "no stream is running: send servo_start first")
+        raise wrong_mode("no stream is running: send servo_start first", "setpoints")
     setpoints = command.setpoints or ()
     if len(setpoints) > command.ticks:
-        why = (
-            f"setpoints has {len(setpoints)} entries; it must have one per tick, and ticks is {command.ticks}"
-        )
+        why = f"setpoints has {len(setpoints)} entries: must be at most {command.ticks}, one per tick"
         raise RefusalError("out_of_range", "setpoints", why, command.ticks)
     for number, setpoint in enumerate(setpoints):
         check_joints(setpoint.q, robot.setup.description, f"setpoints[{number}].q")

@@ -1,6 +1,5 @@
 """Collisions of the arm with itself and the floor, using the robot file's capsules."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -20,7 +19,6 @@ from tvist_controller.foresight.clearance import (
     stop_has_room,
 )
 from tvist_controller.line.differentiator import Floats, Target
-from tvist_controller.refusal import RefusalError
 from tvist_controller.trajectory import CheckedMotion
 from tvist_plant.chain import AXES, chain_of
 from tvist_plant.description import Payload, RobotDescription
@@ -97,13 +95,6 @@ class CollisionModel:
                 posture = ", ".join(f"{angle:.4g}" for angle in q)
                 return f"at q = [{posture}] {met}, and at least {1e3 * CLEARANCE:g} mm are required"
         return None
-
-    def check_place(self, q: Floats, payloads: Sequence[Payload], field: str) -> None:
-        """Refuse a posture or payload with bodies too close; the RefusalError names the field."""
-        met = self.misplaced(q, *payloads)
-        if met is not None:
-            why = f"{met}: choose a posture in which the arm and its payload are clear"
-            raise RefusalError("collision", field, why, CLEARANCE)
 
     def on_way(self, way: CheckedMotion, *, before: Floats | None = None) -> tuple[float, CloseBodies] | None:
         """Return the first meeting on a path with its position (share of the path), or None.

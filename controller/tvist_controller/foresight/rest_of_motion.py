@@ -122,7 +122,7 @@ class StreamGuard(Guard):
         jerk = self._stops.jerk if jerk is None else jerk
         fastest = _fastest(qd, qdd, jerk)
         ramps = (acceleration + np.abs(qdd)) / jerk
-        return np.asarray(fastest * (fastest / (2.0 * acceleration) + ramps + self._stops.period))
+        return np.asarray(fastest * (fastest / (2.0 * acceleration) + ramps + PERIOD))
 
 
 def _fastest(qd: Floats, qdd: Floats, jerk: float) -> Floats:
@@ -166,8 +166,7 @@ class RemainingMotion:
         ahead = self._stopper.foresee()
         if ahead is None:
             return None, None
-        last = resting_after(ahead)
-        return max(last - 1, 0) * PERIOD, float(np.abs(ahead[-1] - ahead[1]).max())
+        return max(resting_after(ahead) - 1, 0) * PERIOD, float(np.abs(ahead[-1] - ahead[1]).max())
 
     def after_stream(self, end: JointStop) -> CloseBodies | None:
         """Return the first meeting while the end of a stream runs through the filter, else None."""

@@ -24,7 +24,7 @@ class Stopper:
 
     def __init__(self, cycle: ControlCycle) -> None:
         self._cycle = cycle
-        self.stops = StopPlanner(cycle.description, cycle.dynamics, PERIOD)
+        self.stops = StopPlanner(cycle.description, cycle.dynamics)
         self._wanted = math.inf
 
     def foresee(self, tvist: Filter | None = None, trajectory: Trajectory | None = None) -> Floats | None:
@@ -98,7 +98,7 @@ class Stopper:
         asked: Floats | None = None
         lasts, runs_out = math.inf, StopPlan(None, None, deceleration is not None, None, None)
         if ahead.rests:
-            asked = torque_along(cycle.dynamics, np.array(ahead.references), PERIOD)
+            asked = torque_along(cycle.dynamics, np.array(ahead.references))
             quickest = self.stops.under(ahead, state, forecast, deceleration, asked)
             lasts = max((ahead.last - 1) * PERIOD, 0.0)
             runs_out = self._plan(None, deceleration, lasts, ahead.references[-1])

@@ -11,8 +11,8 @@ from typing import TypeVar
 
 import numpy as np
 
+from tvist_controller.kinematics.arm import InverseDynamics
 from tvist_controller.line.differentiator import STILL, Floats, ShapedReference, Target, rests_at
-from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.line.limits import GENTLEST_STOP, StopTorque
 from tvist_controller.line.line_filter import LineFilter
 from tvist_controller.trajectory import (
@@ -54,7 +54,7 @@ class LineSimulation:
             self.references.append(self._shaped.joints.position)
             settled, shaped = line_filter is None or line_filter.settled, self._shaped
             standing = trajectory.standing and settled
-            self.rests = standing and rests_at(shaped.posture(x), shaped.joints.published, PERIOD)
+            self.rests = standing and rests_at(shaped.posture(x), shaped.joints.published)
 
     @cached_property
     def last(self) -> int:
@@ -94,13 +94,12 @@ class StopPlan:
 class StopPlanner:
     """Finds the quickest permitted stop."""
 
-    def __init__(self, description: RobotDescription, dynamics: InverseDynamics, period: float) -> None:
+    def __init__(self, description: RobotDescription, dynamics: InverseDynamics) -> None:
         limits = description.limits
         self._dynamics = dynamics
         self._torque, self._position = np.array(limits.torque), np.array(limits.position)
         self.highest, self.jerk = min(limits.acceleration), min(limits.jerk)
         """Largest acceleration and jerk of any stop [rad/s^2, rad/s^3]."""
-        self.period = period  # tick [s]
 
     def on_path(
         self,
@@ -149,7 +148,7 @@ class StopPlanner:
         along: list[float] = []  # distance of the motion at each known tick
 
         def permitted(stop: PathStop) -> bool:
-            ticks = math.ceil(stop.duration / self.period)
+            ticks = math.ceil(stop.duration / PERIOD)
             ahead.until(ticks + 1)
             news = ahead.samples[2 + len(along) :]
             along.extend(forecast.path.forwards(x - newest) for x in news)
@@ -180,21 +179,14 @@ class StopPlanner:
             return self._behind(stop, along) and stop.hardest <= self.highest
 
         stops = (
-            SlowedStop(
-                path,
-                samples,
-                acceleration=acceleration,
-                jerk=0.5 * self.jerk,
-                fastest=fastest,
-                period=self.period,
-            )
+            SlowedStop(path, samples, acceleration=acceleration, jerk=0.5 * self.jerk, fastest=fastest)
             for acceleration in self._ladder(wanted)
         )
         return _first(filter(permitted, stops), lambda stop, rebound: torque.holds(stop, rebound=rebound))
 
     def _behind(self, stop: PathStop | SlowedStop, along: Sequence[float]) -> bool:
         """Return whether a stop is never ahead of a motion whose distance at each tick is known."""
-        shares = (stop.share(number * self.period) for number in range(1, len(along) + 1))
+        shares = (stop.share(number * PERIOD) for number in range(1, len(along) + 1))
         return all(share <= limit + ROUNDING for share, limit in zip(shares, along, strict=True))
 
     def by_joints(
@@ -209,9 +201,7 @@ class StopPlanner:
 
     def stop(self, state: Target, acceleration: float) -> JointStop:
         """Return a stop with independent joints at an acceleration [rad/s^2], without checking torque."""
-        return JointStop(
-            state.q, state.qd, state.qdd, acceleration=acceleration, jerk=self.jerk, period=self.period
-        )
+        return JointStop(state.q, state.qd, state.qdd, acceleration=acceleration, jerk=self.jerk)
 
     def _quickest_on_path(
         self,
@@ -229,7 +219,7 @@ class StopPlanner:
         stops = (
             PathStop(
                 path, newest, newest - state.q, state.qdd,
-                acceleration=acceleration, braking=kept.acceleration, jerk=kept.jerk, period=self.period,
+                acceleration=acceleration, braking=kept.acceleration, jerk=kept.jerk,
             )
             for acceleration in self._ladder(wanted)
             if (kept := self._keeping(state, forecast, acceleration)) is not None
@@ -239,7 +229,7 @@ class StopPlanner:
     def _keeping(self, state: Target, forecast: BrakingForecast, acceleration: float) -> MotionLimits | None:
         """Return limits of a stop's parameter that keep all joints within an acceleration and the stops' jerk."""
         speed, rise = abs(forecast.path.forwards(state.qd)), abs(forecast.path.forwards(state.qdd))
-        fastest = speed + self.period * rise + rise * rise / self.jerk
+        fastest = speed + PERIOD * rise + rise * rise / self.jerk
         return forecast.path.keeping(MotionLimits(fastest, acceleration, self.jerk), fastest, state.q)
 
     def _ladder(self, wanted: float | None) -> Iterator[float]:

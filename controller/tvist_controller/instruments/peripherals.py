@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import Any, get_args
 
-from tvist_controller.refusal import RefusalError
+from tvist_controller.refusal import missing, out_of_range
 from tvist_protocol.io import (
     BITS,
     NUMBERS,
@@ -141,14 +141,14 @@ class Peripherals:
         runs: tuple[SetRegisters | Registers, ...] = (command, *command.also)
         for run in runs:
             if command.token is None and run.bank.startswith("output"):
-                why = f"token is missing: {run.bank} registers belong to the robot, and writing them needs control"
-                raise RefusalError("missing_field", "token", why)
+                why = f"{run.bank} registers belong to the robot, and writing them needs control"
+                raise missing("token", why)
         for number, run in enumerate(runs):
             where = f"also[{number - 1}].values" if number else "values"
             there = BITS if run.bank.endswith("bit") else NUMBERS
             if run.first + len(run.values) > there:
-                why = f"first is {run.first} with {len(run.values)} values; {run.bank} has {there} registers"
-                raise RefusalError("out_of_range", where, why, there)
+                count = f"{len(run.values)} values from register {run.first}"
+                raise out_of_range(where, count, f"within the {there} registers of {run.bank}", there)
             for k, value in enumerate(run.values):
                 _check(f"{where}[{k}]", value, run.bank)
         for run in runs:
@@ -218,4 +218,4 @@ def _check(where: str, value: Register, bank: Bank) -> None:
     else:
         fits, wanted = not isinstance(value, bool), "a number"
     if not fits:
-        raise RefusalError("out_of_range", where, f"{where} is {value}; {bank} registers take {wanted}")
+        raise out_of_range(where, value, f"{wanted} for {bank} registers")

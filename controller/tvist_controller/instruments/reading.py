@@ -90,7 +90,7 @@ class Reading:
     @cached_property
     def rotation(self) -> Floats:
         """Measured rotation from flange to base frame, shape (3, 3)."""
-        return self.rigid.flange_rotation(self.motion[ACTUAL_Q])
+        return self.rigid.arm.pose(self.motion[ACTUAL_Q])[0]
 
     @cached_property
     def estimate(self) -> Floats:

@@ -8,8 +8,7 @@ from msgspec import Struct
 from tvist_controller.kinematics.arm import Arm
 from tvist_controller.kinematics.pose import rotation_vector
 from tvist_controller.line.differentiator import Floats, middle_of
-from tvist_controller.line.line_tick import TORQUE
-from tvist_controller.line.sample import Sample
+from tvist_controller.line.line_tick import TORQUE, Sample
 from tvist_plant.plant import PERIOD, Plant, PlantTruth
 from tvist_protocol.codec import encode
 from tvist_protocol.io import Io
@@ -57,7 +56,7 @@ class Report(Struct, gc=False):
         reference, target, target_qd, target_qdd, moment = sample.signals[: TORQUE + 1].tolist()
         unshaped: Sequence[list[float] | None] = (None, None, None)
         if sample.unshaped is not None:
-            before = middle_of(sample.unshaped, PERIOD)
+            before = middle_of(sample.unshaped)
             unshaped = [row.tolist() for row in (before.q, before.qd, before.qdd)]
         motors = (None, None, None) if sample.motors is None else sample.motors.rows.tolist()
         motion = self.arm.motion(measured.q, measured.qd).tolist()
@@ -120,6 +119,7 @@ def true_modes(plant: Plant, joints: int) -> dict[str, list[float]]:
 def truth_message(plant: Plant, tick: int, modes: dict[str, list[float]]) -> Truth:
     """Return the message of the truth with true modes; raise ValueError if the plant has none."""
     truth = truth_of(plant)
+    gears, links = truth.static_gear_deflection, truth.static_link_deflection
     return Truth(
         tick=tick,
         timestamp=tick * PERIOD,
@@ -129,8 +129,8 @@ def truth_message(plant: Plant, tick: int, modes: dict[str, list[float]]) -> Tru
         link_deflection=truth.link_deflection.tolist(),
         flange_pose=truth.flange_position.tolist() + rotation_vector(truth.flange_rotation),
         tool_acceleration=truth.specific_force.tolist(),
-        static_gear_deflection=_listed(truth.static_gear_deflection),
-        static_link_deflection=_listed(truth.static_link_deflection),
+        static_gear_deflection=[] if gears is None else gears.tolist(),
+        static_link_deflection=[] if links is None else links.tolist(),
         body_poses=plant.places().ravel().tolist(),
         contact_force=[] if plant.things() is None else plant.contact().tolist(),
         **(modes or {name: [] for name in MODES}),
@@ -145,7 +145,3 @@ def truth_of(plant: Plant) -> PlantTruth:
             f"truth is on, but the plant {type(plant).__name__} cannot report it: turn truth off"
         )
     return truth
-
-
-def _listed(values: Floats | None) -> list[float]:
-    return [] if values is None else list(values.tolist())

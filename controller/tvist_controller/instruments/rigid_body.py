@@ -51,7 +51,7 @@ class RigidBody:
     """
 
     def __init__(self, description: RobotDescription) -> None:
-        self._arm = self._tool = Arm(description)
+        self.arm = self._tool = Arm(description)
         self._payload: Payload | None = None
         self._offset: tuple[float, ...] = AT_FLANGE
         drives = description.drives
@@ -61,8 +61,8 @@ class RigidBody:
         still = np.zeros((3, description.joints))
         self.tool(still, AT_FLANGE)  # this loads compiled code, which takes many ticks, as the next three do
         self.external(np.zeros((ROWS, description.joints)), AT_FLANGE)
-        self.flange_rotation(still[0])
-        momentum_of(self._arm.chain, still[0], still[1], self._arm.scratch)
+        self.arm.pose(still[0])
+        momentum_of(self.arm.chain, still[0], still[1], self.arm.scratch)
 
     def tool(self, motion: Floats, offset: Sequence[float]) -> Floats:
         """Return pose [m, rad], velocity [m/s, rad/s] and acceleration of the TCP, base frame, (18,)."""
@@ -71,7 +71,7 @@ class RigidBody:
 
     def _at(self, offset: Sequence[float]) -> Arm:
         if (wanted := tuple(offset)) != self._offset:
-            self._offset, self._tool = wanted, self._arm.with_tool(wanted)
+            self._offset, self._tool = wanted, self.arm.with_tool(wanted)
         return self._tool
 
     def external(self, rows: Floats, offset: Sequence[float]) -> Floats:
@@ -88,35 +88,30 @@ class RigidBody:
         estimate(self._at(offset).chain, rows, self._drives, share if self._linear else np.tanh(share), out)
         return out
 
-    def flange_rotation(self, q: Floats) -> Floats:
-        """Return the rotation from the flange to the base frame, shape (3, 3)."""
-        return self._arm.pose(q)[0]
-
     def elbow(self, q: Floats, qd: Floats) -> tuple[list[float], list[float]]:
         """Return position [m] and velocity [m/s] of the elbow's axis, or of the flange without an elbow."""
         joints, out = self._joints_to_elbow, np.empty(12)
-        end_motion(self._arm.chain[: joints + 1], q[:joints], qd[:joints], out)
+        end_motion(self.arm.chain[: joints + 1], q[:joints], qd[:joints], out)
         return out[:3].tolist(), out[6:9].tolist()
 
     def momentum(self, q: Floats, qd: Floats, payload: Payload) -> float:
         """Return the magnitude of the momentum of links and payload, |Σ m v| [kg m/s]."""
         self._load(payload)
-        return hypot(*momentum_of(self._arm.chain, q, qd, self._arm.scratch))
+        return hypot(*momentum_of(self.arm.chain, q, qd, self.arm.scratch))
 
     def moment(self, motion: Floats, payload: Payload) -> list[float]:
         """Return the joint torques of a motion [N m]."""
         self._load(payload)
-        torque: list[float] = self._arm.torque(*motion).tolist()
-        return torque
+        return list(self.arm.torque(*motion).tolist())
 
     def base_wrench(self, motion: Floats, payload: Payload) -> list[float]:
         """Return force [N] and torque [N m] on the base, base frame, without the base's own weight."""
         self.moment(motion, payload)
-        torque, force = -self._arm.scratch[0, 22:25], -self._arm.scratch[0, 25:28]
+        torque, force = -self.arm.scratch[0, 22:25], -self.arm.scratch[0, 25:28]
         return [*force.tolist(), *torque.tolist()]
 
     def _load(self, payload: Payload) -> None:
         if payload is self._payload or payload == self._payload:
             return
         self._payload = payload
-        self._arm.chain[-2, BODY:] = self._arm.loaded(body(payload))
+        self.arm.chain[-2, BODY:] = self.arm.loaded(body(payload))

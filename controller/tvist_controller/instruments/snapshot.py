@@ -1,15 +1,33 @@
 """One tick of a robot as UR's interfaces report it, with RTDE's names."""
 
+from collections.abc import Iterator
 from functools import cached_property
 
 from tvist_controller.instruments.motors import Meters, joint_ratings
 from tvist_controller.instruments.reading import POWERED, Reading
 from tvist_controller.instruments.rigid_body import RigidBody
-from tvist_controller.instruments.variables import READERS
+from tvist_controller.instruments.variables import VARIABLES, Read, entry
 from tvist_controller.instruments.wrench import RUNNING
 from tvist_plant.description import RobotDescription
-from tvist_protocol.io import Io
+from tvist_protocol.io import BITS, NUMBERS, Io
 from tvist_protocol.stream import State
+
+
+def _registers() -> Iterator[tuple[str, Read]]:
+    def bit(bank: str, number: int) -> Read:
+        return lambda r: bool(getattr(r.io, bank)[number // 32] >> number % 32 & 1)
+
+    for bank in ("input", "output"):
+        yield from ((f"{bank}_bit_registers{bits}", entry(f"{bank}_bit_register", number))
+                    for number, bits in enumerate(("0_to_31", "32_to_63")))  # fmt: skip
+        yield from ((f"{bank}_bit_register_{k}", bit(f"{bank}_bit_register", k)) for k in range(BITS))
+        for kind in ("int", "double"):
+            name = f"{bank}_{kind}_register"
+            yield from ((f"{name}_{k}", entry(name, k)) for k in range(NUMBERS))
+
+
+READERS: dict[str, Read] = {row.name: row.read for row in VARIABLES.values()} | dict(_registers())
+"""Function that reads each variable and register, by RTDE's name."""
 
 
 class Snapshot(Reading):

@@ -15,8 +15,7 @@ from tvist_controller.instruments.wrench import (
     sensed_at_tool,
     without_weight,
 )
-from tvist_controller.line.line_tick import QDD, TORQUE, Q
-from tvist_controller.line.sample import Sample
+from tvist_controller.line.line_tick import QDD, TORQUE, Q, Sample
 from tvist_plant.description import RobotDescription
 from tvist_plant.model import Floats
 from tvist_plant.plant import GRAVITY, PERIOD
@@ -38,8 +37,7 @@ class ToolForces:
 
     def torques(self) -> list[float]:
         """Return the external joint torques, shape (n,) [N m]."""
-        torques: list[float] = self._estimate()[6:].tolist()
-        return torques
+        return list(self._estimate()[6:].tolist())
 
     def wrench(self) -> list[float]:
         """Return external force and torque at the tool centre point, base frame [N, N m]."""
@@ -48,8 +46,7 @@ class ToolForces:
             found = self._since_zeroed(self._estimate()[:6])
         else:
             found = self._sensed(sample.wrench, sample.measured.q)
-        wrench: list[float] = found.tolist()
-        return wrench
+        return list(found.tolist())
 
     def zero(self) -> None:
         """Take the present force and torque at the tool as zero; with a sensor, in its frame."""
@@ -57,7 +54,7 @@ class ToolForces:
         if sample.wrench is None:
             found = self._estimate()[:6]
         else:
-            rotation = self._rigid.flange_rotation(sample.measured.q)
+            rotation, _ = self._rigid.arm.pose(sample.measured.q)
             found = without_weight(sample.wrench, rotation, self._declared())
         self._peripherals.zero_wrench(found.tolist())
 
@@ -114,13 +111,12 @@ class ToolForces:
         (zeros), only the weight is subtracted. `zeroed`: whether the zero was taken with this sensor.
         """
         measured, zero = sample.measured, self._peripherals.wrench_zero
-        rotation, specific = self._rigid.flange_rotation(measured.q), measured.accelerometer
+        rotation, specific = self._rigid.arm.pose(measured.q)[0], measured.accelerometer
         if not specific.any():
             specific = GRAVITY * rotation[2]
         force = wrench[:3] - zero[:3] if zeroed and zero is not None else wrench[:3]
-        found: Floats = rotation @ (force + self._declared().mass * specific)
-        return found
+        return np.asarray(rotation @ (force + self._declared().mass * specific))
 
     def _sensed(self, raw: Floats, q: Floats) -> Floats:
-        rotation, there = self._rigid.flange_rotation(q), self._peripherals
+        rotation, there = self._rigid.arm.pose(q)[0], self._peripherals
         return sensed_at_tool(raw, rotation, self._declared(), there.wrench_zero, there.tcp_offset)

@@ -1,6 +1,6 @@
 """RTDE's output variables as rows: name, type, source, meaning, and the function that reads a tick."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from math import sqrt
 from operator import attrgetter, sub
 from typing import Any, Final, Literal, NamedTuple
@@ -20,7 +20,6 @@ from tvist_controller.instruments.wrench import (
     unshaped,
 )
 from tvist_plant.plant import GRAVITY
-from tvist_protocol.io import BITS, NUMBERS
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 
 START: Final = 40.0
@@ -41,8 +40,7 @@ SAFETY_BITS: dict[int, int] = {
     SafetyMode.ROBOT_EMERGENCY_STOP: 1 << 6 | _EMERGENCY | _STOPPED,
     SafetyMode.VIOLATION: 1 << 8 | _STOPPED,
     SafetyMode.FAULT: 1 << 9 | _STOPPED,
-}
-"""Bits of `safety_status_bits` for each safety mode."""
+}  # bits of `safety_status_bits` for each safety mode
 ORDER = (0, 3, 5, 1, 2, 4)  # places of Ixx Iyy Izz Ixy Ixz Iyz, UR's order, in the order of robot files
 _RUNNING: set[int] = {
     RuntimeState.STOPPING, RuntimeState.PLAYING, RuntimeState.PAUSING, RuntimeState.RESUMING,
@@ -75,6 +73,11 @@ def _computed(name: str, type_: str, what: str, read: Read) -> Variable:
     return Variable(name, type_, "computed", what, read)
 
 
+def entry(name: str, number: int) -> Read:
+    """Return the function that reads an entry of a list of `Io`."""
+    return lambda r: getattr(r.io, name)[number]
+
+
 def _constant(name: str, type_: str, what: str, value: object = 0) -> Variable:
     return Variable(name, type_, "constant", what, lambda _: value)
 
@@ -96,9 +99,8 @@ def _runtime_state(r: Reading) -> int:
 
 def _speed_scaling(r: Reading) -> float:
     slider = r.io.target_speed_fraction
-    if r.io.program_state == "PAUSED" or slider <= 0.0:
-        return 0.0
-    return min(r.state.speed_scaling / slider, 1.0)
+    stands = r.io.program_state == "PAUSED" or slider <= 0.0
+    return 0.0 if stands else min(r.state.speed_scaling / slider, 1.0)
 
 
 def _target_moment(r: Reading) -> list[float]:
@@ -110,16 +112,14 @@ def _target_moment(r: Reading) -> list[float]:
 
 
 def _target_current(r: Reading) -> list[float]:
-    if not r.driven:
-        return [0.0] * len(r.ratings)
-    return [m / rating.torque_constant for m, rating in zip(r.target_moment, r.ratings, strict=True)]
+    moments = r.target_moment if r.driven else [0.0] * len(r.ratings)
+    return [m / rating.torque_constant for m, rating in zip(moments, r.ratings, strict=True)]
 
 
 def _tool_acceleration(r: Reading) -> list[float]:
     linear: list[float] = (r.rotation @ np.array(r.state.actual_tool_accelerometer)).tolist()
     linear[2] -= GRAVITY
-    alpha: list[float] = r.shaped[15:].tolist()
-    offset = r.io.tcp_offset
+    alpha, offset = list[float](r.shaped[15:].tolist()), r.io.tcp_offset
     if any(offset[:3]):
         arm: list[float] = (r.rotation @ np.array(offset[:3])).tolist()
         linear = add(linear, carried(r.state.actual_TCP_speed[3:], alpha, arm))
@@ -130,9 +130,8 @@ def _tool_force(r: Reading) -> list[float]:
     raw, zero = r.state.flange_wrench, r.io.tcp_force_zero
     if raw is None:
         return since_zeroed(r.estimate[:6].tolist(), zero)
-    found = sensed_at_tool(np.array(raw), r.rotation, r.io.payload, zero, r.io.tcp_offset)
-    sensed: list[float] = found.tolist()
-    return sensed
+    sensed = sensed_at_tool(np.array(raw), r.rotation, r.io.payload, zero, r.io.tcp_offset)
+    return list(sensed.tolist())
 
 
 def _force_from_currents(r: Reading) -> list[float]:
@@ -169,8 +168,7 @@ def _joint_mode(r: Reading) -> int:
 # fmt: off
 
 _ROWS = (
-    _state("target_q", "VECTOR6D",
-           "reference before shaping, from the program or client [rad].",
+    _state("target_q", "VECTOR6D", "reference before shaping, from the program or client [rad].",
            lambda r: unshaped(r.state)[0]),
     _state("target_qd", "VECTOR6D", "velocity of the reference before shaping [rad/s].",
            lambda r: unshaped(r.state)[1]),
@@ -223,14 +221,11 @@ _ROWS = (
               attrgetter("dissipated")),
 
     # Motion, torque and electricity of the joints.
-    _state("shaped_q", "VECTOR6D",
-           "reference after shaping, which the drives follow; only in TVIST [rad].",
+    _state("shaped_q", "VECTOR6D", "reference after shaping, which the drives follow; only in TVIST [rad].",
            lambda r: r.state.target_q),
-    _state("shaped_qd", "VECTOR6D",
-           "velocity of the reference after shaping; only in TVIST [rad/s].",
+    _state("shaped_qd", "VECTOR6D", "velocity of the reference after shaping; only in TVIST [rad/s].",
            lambda r: r.state.target_qd),
-    _state("shaped_qdd", "VECTOR6D",
-           "acceleration of the reference after shaping; only in TVIST [rad/s²].",
+    _state("shaped_qdd", "VECTOR6D", "acceleration of the reference after shaping; only in TVIST [rad/s²].",
            lambda r: r.state.target_qdd),
     _computed("target_moment", "VECTOR6D",
               "torque of the rigid model with the declared payload for the target motion [N m]: the state's "
@@ -264,14 +259,12 @@ _ROWS = (
     # Motion and forces of tool and payload, in the base frame unless stated otherwise.
     _io("tcp_offset", "VECTOR6D", "tool centre point in the flange frame [m, rad]."),
     _state("actual_TCP_pose", "VECTOR6D", "TCP pose at the measured angles [m, rad]."),
-    _state("actual_TCP_speed", "VECTOR6D",
-           "TCP velocity from measured angles and velocities [m/s, rad/s]."),
+    _state("actual_TCP_speed", "VECTOR6D", "TCP velocity from measured angles and velocities [m/s, rad/s]."),
     _state("actual_tool_accelerometer", "VECTOR3D",
            "specific force in the flange frame; at rest it points up with 9.81 [m/s²]."),
     _computed("target_TCP_pose", "VECTOR6D", "TCP pose at the target angles [m, rad].",
               lambda r: r.target[:6].tolist()),
-    _computed("target_TCP_speed", "VECTOR6D",
-              "TCP velocity from target angles and velocities [m/s, rad/s].",
+    _computed("target_TCP_speed", "VECTOR6D", "TCP velocity from target angles and velocities [m/s, rad/s].",
               lambda r: r.target[6:12].tolist()),
     _computed("target_TCP_acceleration", "VECTOR6D",
               "TCP acceleration from target angles, velocities and accelerations [m/s², rad/s²].",
@@ -312,8 +305,7 @@ _ROWS = (
         "declared inertia about the centre of mass: xx yy zz xy xz yz [kg m²].",
         lambda r: [r.io.payload.inertia[place] for place in ORDER]),
     _constant("target_gravity", "VECTOR3D",
-              "0 0 9.81, gravity as an equivalent acceleration of the base [m/s²].",
-              [0.0, 0.0, GRAVITY]),
+              "0 0 9.81, gravity as an equivalent acceleration of the base [m/s²].", [0.0, 0.0, GRAVITY]),
     _constant("target_base_acceleration", "VECTOR6D", "zero; the base does not move [m/s², rad/s²].", [0.0] * 6),
     _computed("target_base_wrench", "VECTOR6D",
               "force and torque at the base of the arm with the declared payload, for the target motion "
@@ -329,58 +321,30 @@ _ROWS = (
     _io("actual_configurable_digital_output_bits", "UINT64", "bits 8–15 of the digital outputs, not shifted.",
         lambda r: r.io.actual_digital_output_bits & CONFIGURABLE),
     _io("analog_io_types", "UINT32", "bits 0–1 analogue inputs, 2–3 outputs; 0 is current, 1 voltage."),
-    _io("standard_analog_input0", "DOUBLE", "analogue input 0 [A or V].",
-        lambda r: r.io.standard_analog_input[0]),
-    _io("standard_analog_input1", "DOUBLE", "analogue input 1 [A or V].",
-        lambda r: r.io.standard_analog_input[1]),
-    _io("standard_analog_output0", "DOUBLE", "analogue output 0 [A or V].",
-        lambda r: r.io.standard_analog_output[0]),
-    _io("standard_analog_output1", "DOUBLE", "analogue output 1 [A or V].",
-        lambda r: r.io.standard_analog_output[1]),
+    *(_io(f"{name}{k}", "DOUBLE", f"analogue {kind} {k} [A or V].", entry(name, k))
+      for kind, name in (("input", "standard_analog_input"), ("output", "standard_analog_output"))
+      for k in (0, 1)),
     _constant("io_current", "DOUBLE", "0; the terminals' load is not simulated [mA].", 0.0),
     _computed("tool_mode", "UINT32", "from the robot's mode, with the numbers of `joint_mode`.", _joint_mode),
     _io("tool_analog_input_types", "UINT32",
         "types of the tool's analogue inputs, bits 0–1; 0 is current, 1 voltage."),
-    _io("tool_analog_input0", "DOUBLE", "analogue input 0 of the tool [A or V].",
-        lambda r: r.io.tool_analog_input[0]),
-    _io("tool_analog_input1", "DOUBLE", "analogue input 1 of the tool [A or V].",
-        lambda r: r.io.tool_analog_input[1]),
+    *(_io(f"tool_analog_input{k}", "DOUBLE", f"analogue input {k} of the tool [A or V].",
+          entry("tool_analog_input", k)) for k in (0, 1)),
     _io("tool_output_voltage", "INT32", "voltage of the tool's supply; 0 if it is off [V]."),
     _constant("tool_output_current", "DOUBLE", "0; the tool's load is not simulated [mA].", 0.0),
     _computed("tool_temperature", "DOUBLE",
               "temperature of the last joint, which holds the tool's electronics [°C].",
               lambda r: r.temperatures[-1]),
     _io("tool_output_mode", "UINT8", "0, the tool's outputs are digital; 1, they are a second supply."),
-    _io("tool_digital_output0_mode", "UINT8", "1, the output sinks; 2, it sources; 3, both."),
-    _io("tool_digital_output1_mode", "UINT8", "1, the output sinks; 2, it sources; 3, both."),
+    *(_io(f"tool_digital_output{k}_mode", "UINT8", "1, the output sinks; 2, it sources; 3, both.")
+      for k in (0, 1)),
     _constant("euromap67_input_bits", "UINT32", "0; no Euromap 67 interface is fitted."),
     _constant("euromap67_output_bits", "UINT32", "0; no Euromap 67 interface is fitted."),
     _constant("euromap67_24V_voltage", "DOUBLE", "0; no Euromap 67 interface is fitted [V].", 0.0),
     _constant("euromap67_24V_current", "DOUBLE", "0; no Euromap 67 interface is fitted [mA].", 0.0),
-    _constant("encoder0_raw", "INT32", "0; no conveyor's encoder is connected."),
-    _constant("encoder1_raw", "INT32", "0; no conveyor's encoder is connected."),
+    *(_constant(f"encoder{k}_raw", "INT32", "0; no conveyor's encoder is connected.") for k in (0, 1)),
 )
 # fmt: on
 
 VARIABLES = {row.name: row for row in _ROWS}
 """Output variables of RTDE other than registers, in the order of the reference page."""
-
-
-def _registers() -> Iterator[tuple[str, Read]]:
-    def entry(bank: str, number: int) -> Read:
-        return lambda r: getattr(r.io, bank)[number]
-
-    def bit(bank: str, number: int) -> Read:
-        return lambda r: bool(getattr(r.io, bank)[number // 32] >> number % 32 & 1)
-
-    for bank in ("input", "output"):
-        yield from ((f"{bank}_bit_registers{bits}", entry(f"{bank}_bit_register", number))
-                    for number, bits in enumerate(("0_to_31", "32_to_63")))  # fmt: skip
-        yield from ((f"{bank}_bit_register_{k}", bit(f"{bank}_bit_register", k)) for k in range(BITS))
-        for kind in ("int", "double"):
-            name = f"{bank}_{kind}_register"
-            yield from ((f"{name}_{k}", entry(name, k)) for k in range(NUMBERS))
-
-
-READERS: dict[str, Read] = {row.name: row.read for row in _ROWS} | dict(_registers())
-"""Function that reads each variable and register, by RTDE's name."""

@@ -108,8 +108,7 @@ def without_weight(raw: Floats, rotation: Floats, payload: Payload) -> Floats:
     As on UR's e-Series, the payload's inertia is not subtracted. `rotation` leads from the flange to the base frame.
     """
     weight = -payload.mass * GRAVITY * rotation[2]
-    felt: Floats = raw - np.concatenate((weight, np.cross(payload.com, weight)))
-    return felt
+    return np.asarray(raw - np.concatenate((weight, np.cross(payload.com, weight))))
 
 
 def sensed_at_tool(

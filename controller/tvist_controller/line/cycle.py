@@ -4,15 +4,14 @@ from typing import TypeVar
 
 import numpy as np
 
+from tvist_controller.kinematics.arm import InverseDynamics
 from tvist_controller.line.differentiator import Differentiator, Floats, ShapedReference, Target, rests_at
 from tvist_controller.line.drive_feed_forward import DriveFeedForward
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
-from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.line.limits import arm_limits
 from tvist_controller.line.line_filter import LineFilter
 from tvist_controller.line.line_mode import Guard, LineMode, Obstacle, check_change
-from tvist_controller.line.line_tick import SIGNALS, to_drives
-from tvist_controller.line.sample import Sample
+from tvist_controller.line.line_tick import SIGNALS, Sample, to_drives
 from tvist_controller.trajectory import PlannedMotion, Rest, StuckError, Trajectory
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand
@@ -50,13 +49,12 @@ class ControlCycle:
         self.trajectory: Trajectory = Rest(q)
         self.filter = LineFilter(tvist, arm_limits(description))
         """TVIST: shaper, estimator and fractional-delay filter."""
-        self.shaped = ShapedReference(q, PERIOD)
+        self.shaped = ShapedReference(q)
         self.dynamics = InverseDynamics(description, declared)
         """Torques of the rigid arm with its declared payload."""
         self.drives = DriveFeedForward(
-            description, PERIOD, compensate_sag=compensate_sag, positions=self.plant.supervised
-        )
-        """Joint controllers: from the target to the drive commands."""
+            description, compensate_sag=compensate_sag, positions=self.plant.supervised
+        )  # joint controllers: from the target to the drive commands
         self.drives.use(elastic)
         self.drives.compensate(law)
         self.mode = LineMode.REST
@@ -209,7 +207,7 @@ class ControlCycle:
         return (
             self.trajectory.standing
             and (not self.mode.shaped or self.filter.settled)
-            and rests_at(sample.reference, sample.target, PERIOD)
+            and rests_at(sample.reference, sample.target)
         )
 
     def _settle(self) -> None:

@@ -8,6 +8,7 @@ import numpy.typing as npt
 from msgspec import Struct
 
 from tvist_controller._compiled import compiled_for_ticks
+from tvist_plant.plant import PERIOD
 from tvist_shaping.base import Posture
 
 Floats = npt.NDArray[np.float64]
@@ -24,20 +25,20 @@ class Target(Struct, frozen=True, eq=False, gc=False):
     qdd: Floats  # q̈*, shape (n,) [rad/s^2]
 
 
-def rests_at(reference: Floats, target: Target, period: float) -> bool:
+def rests_at(reference: Floats, target: Target) -> bool:
     """Return whether the shaped reference has come to rest at an unshaped reference."""
     # The central differences' equivalent of q*ᵢ - q*ᵢ₋₁.
-    step = period * (target.qd - 0.5 * period * target.qdd)
+    step = PERIOD * (target.qd - 0.5 * PERIOD * target.qdd)
     return bool(max(np.abs(step).max(), np.abs(reference - target.q).max()) <= STILL)
 
 
-def central_differences(references: Floats, period: float) -> tuple[Floats, Floats, Floats]:
+def central_differences(references: Floats) -> tuple[Floats, Floats, Floats]:
     """Return positions, velocities and accelerations of references (k + 2, n), equal to `Differentiator`.
 
     They are those of all but the first and last reference, each of shape (k, n).
     """
-    qd: Floats = (references[2:] - references[:-2]) / (2.0 * period)
-    qdd: Floats = np.diff(references, 2, axis=0) / period**2
+    qd: Floats = (references[2:] - references[:-2]) / (2.0 * PERIOD)
+    qdd: Floats = np.diff(references, 2, axis=0) / PERIOD**2
     return references[1:-1], qd, qdd
 
 
@@ -60,10 +61,10 @@ def differentiate(before: Floats, middle: Floats, last: Floats, period: float, r
         rates[1, j] = (rise - fall) / (period * period)
 
 
-def middle_of(window: tuple[Floats, Floats, Floats], period: float) -> Target:
+def middle_of(window: tuple[Floats, Floats, Floats]) -> Target:
     """Return the state at the middle of three references, as `differentiate`."""
     rates = np.empty((2, len(window[1])))
-    differentiate(*window, period, rates)
+    differentiate(*window, PERIOD, rates)
     return Target(window[1], rates[0], rates[1])
 
 
@@ -73,8 +74,7 @@ class Differentiator:
     All refer to the same tick without phase shift, at the cost of one tick of delay. The start is at rest.
     """
 
-    def __init__(self, q: Floats, period: float) -> None:
-        self._period = period
+    def __init__(self, q: Floats) -> None:
         self.reset(q)
 
     def reset(self, q: Floats) -> None:
@@ -91,7 +91,7 @@ class Differentiator:
     @property
     def published(self) -> Target:
         """State one tick before the newest reference, where central differences are accurate to order h²."""
-        return middle_of(self.window, self._period)
+        return middle_of(self.window)
 
     @property
     def position(self) -> Floats:
@@ -109,16 +109,15 @@ class Differentiator:
 
     def _state(self, before: Floats, middle: Floats, last: Floats) -> Target:
         rates = np.empty((2, len(last)))
-        extrapolate(before, middle, last, self._period, rates)
+        extrapolate(before, middle, last, PERIOD, rates)
         return Target(last, rates[0], rates[1])
 
 
 class ShapedReference:
     """Converts filter samples (joint positions or a path's parameter) to targets, from rest."""
 
-    def __init__(self, q: Floats, period: float) -> None:
-        self._period = period
-        self.joints = Differentiator(q, period)  # state of the joints
+    def __init__(self, q: Floats) -> None:
+        self.joints = Differentiator(q)  # state of the joints
         self.reset(q)
 
     def reset(self, q: Floats) -> None:
@@ -132,7 +131,7 @@ class ShapedReference:
         """Accept samples of another kind, at rest; the joints keep their position."""
         self.posture_of = posture_of
         """Function from samples to joint positions; None if samples are joint positions."""
-        self.along = self.joints if posture_of is None else Differentiator(sample, self._period)
+        self.along = self.joints if posture_of is None else Differentiator(sample)
         """State of the samples; without a path, of the joints."""
 
     def take(self, x: Floats, x_star: Floats) -> Floats:

@@ -1,23 +1,16 @@
 """Choice between paper's and elastic feed-forward for the drives, with a smooth transition."""
 
 import numpy as np
-from msgspec import Struct
 
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
 from tvist_controller.line.joint_controllers import LAW, STICTION, WINDUP, YIELDING, joint_rows
-from tvist_controller.line.line_tick import Q_R, QD_R, STATIC, TORQUE, TORQUE_FF, Q
+from tvist_controller.line.line_tick import Q_R, QD_R, STATIC, TORQUE, TORQUE_FF, MotorReference, Q
 from tvist_plant.description import RobotDescription
 from tvist_plant.drives import DriveCommand
+from tvist_plant.plant import PERIOD
 
 FADE = 150  # duration of the transition in motion [ticks]
-
-
-class MotorReference(Struct, frozen=True, eq=False, gc=False):
-    """Motion of the motors that elastic feed-forward commands."""
-
-    rows: Floats  # velocity q̇* + ẇ [rad/s], acceleration q̈* + ẅ [rad/s^2] and torque [N m], shape (3, n)
-    limited: bool  # whether ẅ was limited to the drives' remaining torque
 
 
 class DriveFeedForward:
@@ -30,20 +23,19 @@ class DriveFeedForward:
     def __init__(
         self,
         description: RobotDescription,
-        period: float,
         *,
         compensate_sag: bool = False,
         positions: bool = False,
     ) -> None:
         self._law: Floats | None = None
-        self.rows = joint_rows(description, period, compensate_sag=compensate_sag, positions=positions)
+        self.rows = joint_rows(description, compensate_sag=compensate_sag, positions=positions)
         """Parameters and state of the paper's joint controllers, see `joint_controllers`."""
         self._sags = compensate_sag and not positions
         self.wanted: ElasticFeedForward | None = None
         """Elastic feed-forward in use or next; None for the paper's."""
         self._elastic: ElasticFeedForward | None = None
         self._share, self._rising = 0, False
-        self._rate = 1.0 / (FADE * period)
+        self._rate = 1.0 / (FADE * PERIOD)
         self.reference: MotorReference | None = None
         """Motion of the motors in the last command; None without elastic feed-forward."""
 

@@ -96,12 +96,6 @@ class ElasticFeedForward:
         """Whether the motors have not led for some ticks."""
         return self._ticks == 0 or float(np.abs(self.lead.leads[1]).max()) < SETTLED
 
-    def carry(self, added: Floats) -> None:
-        """Set the payload, see `InverseDynamics.payload_parameters`."""
-        if added is not self._carried:
-            self._carried = added
-            self.lead.chain[-2, BODY:] = self._bare + _moved(added, self._placement)
-
     def command(
         self,
         target: Floats,  # shaped reference, its derivatives, and τ* of the rigid arm, shape (4, n)
@@ -111,7 +105,9 @@ class ElasticFeedForward:
         smooth: bool = True,  # so that the reference's sixth derivative says how bending links accelerate
     ) -> DriveCommand:
         """Take a target and return the command for the previous tick's target."""
-        self.carry(carried)
+        if carried is not self._carried:
+            self._carried = carried
+            self.lead.chain[-2, BODY:] = self._bare + _moved(carried, self._placement)
         motors = np.empty_like(target)
         self.limited = command_motors(self._memory, target, self._ticks, smooth, motors)
         its_sag, self._sag = sag if self._ticks == 0 else self._sag, sag

@@ -10,6 +10,7 @@ from tvist_kernels.compiling import inlined
 from tvist_plant.description import RobotDescription
 from tvist_plant.drives import joint_parameters
 from tvist_plant.imperfections import Imperfections
+from tvist_plant.plant import PERIOD
 from tvist_plant.stiction import stiction_after
 
 LAWS = 9
@@ -27,8 +28,7 @@ def friction_at(law: Floats, j: int, speed: float) -> float:
     """Return sliding friction, [F_c + (F_s - F_c) exp(-(v/v_s)²)] tanh(v/w) + F_v v [N m] (Stribeck)."""
     slow = speed / law[2, j]
     coulomb = law[0, j] * (1.0 + (law[1, j] - 1.0) * math.exp(-slow * slow))
-    friction: float = coulomb * math.tanh(speed / law[3, j]) + law[4, j] * speed
-    return friction
+    return float(coulomb * math.tanh(speed / law[3, j]) + law[4, j] * speed)
 
 
 @compiled_for_ticks
@@ -79,9 +79,7 @@ def command_drives(
         command[2, j] = torque[j] + joints[ROTOR, j] * rates[1, j] + friction + joints[STICTION, j]
 
 
-def joint_rows(
-    description: RobotDescription, period: float, *, compensate_sag: bool = False, positions: bool = False
-) -> Floats:
+def joint_rows(description: RobotDescription, *, compensate_sag: bool, positions: bool) -> Floats:
     """Return each joint's parameters, rows as `ROTOR` etc., shape (19, n); `positions` omits wind-up and sag."""
     drives = description.drives
     friction, stiffness = np.array(drives.coulomb_friction), np.array(drives.gear_stiffness)
@@ -94,7 +92,7 @@ def joint_rows(
         rows[VISCOUS] = friction / drives.friction_width
     else:
         rows[COULOMB] = drives.friction_feedforward * friction
-    rows[WIDTH], rows[PER_SECOND] = drives.friction_feedforward_width, 1.0 / period
+    rows[WIDTH], rows[PER_SECOND] = drives.friction_feedforward_width, 1.0 / PERIOD
     return rows
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from tvist_controller._compiled import compiled_for_ticks
+from tvist_controller.kinematics.arm import InverseDynamics
 from tvist_controller.line.differentiator import Floats, Target, central_differences
-from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.trajectory import AnyStop, MotionLimits, Path
 from tvist_plant.chain import collect_inertia, torques
 from tvist_plant.description import RobotDescription
@@ -181,14 +181,12 @@ def acceleration_on_way(
     gravity = dynamics.gravities(path.states(x, still, still)[0])
     resting = np.maximum(np.abs(gravity), np.abs(dynamics.torques(*path.states(x, velocity * along, still))))
     pushed = np.abs(dynamics.torques(*path.states(x, still, along)) - gravity)
-    room = float(((TORQUE_SHARE * limits - resting) / np.maximum(pushed, 1e-9)).min())
-    return max(room, 0.0)
+    return max(float(((TORQUE_SHARE * limits - resting) / np.maximum(pushed, 1e-9)).min()), 0.0)
 
 
-def torque_along(dynamics: InverseDynamics, references: Floats, period: float) -> Floats:
+def torque_along(dynamics: InverseDynamics, references: Floats) -> Floats:
     """Return the largest torques along references (k >= 3, n) [rad] by central differences, (n,) [N m]."""
-    q, qd, qdd = central_differences(references, period)
+    q, qd, qdd = central_differences(references)
     looked = np.append(np.arange(0, len(q) - 1, LOOK_EVERY), len(q) - 1)
     states = zip(q[looked], qd[looked], qdd[looked], strict=True)
-    most: Floats = np.max([dynamics.effort(*state) for state in states], axis=0)
-    return most
+    return np.asarray(np.max([dynamics.effort(*state) for state in states], axis=0))

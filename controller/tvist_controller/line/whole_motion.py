@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tvist_controller.kinematics.arm import InverseDynamics
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.drive_feed_forward import DriveFeedForward
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
-from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.line.line_tick import SIGNALS, TORQUE, Q, all_to_drives, to_drives
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand
@@ -33,7 +33,7 @@ class DrivenLine:
 
     def __init__(self, description: RobotDescription, declared: Payload, law: Floats | None = None) -> None:
         self._dynamics, self._law = InverseDynamics(description, declared), law
-        self._drives = DriveFeedForward(description, PERIOD)
+        self._drives = DriveFeedForward(description)
         self._parts = self._dynamics.chain, self._dynamics.scratch, self._drives.rows
 
     def drive(

@@ -16,16 +16,15 @@ from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.limits import StreamTorqueMargin
 from tvist_controller.line.line_mode import LineMode
-from tvist_controller.line.sample import Sample
+from tvist_controller.line.line_tick import Sample
 from tvist_controller.motion.arm_power import ArmPower
 from tvist_controller.motion.motions import Motions
 from tvist_controller.motion.safety_system import PUT, RUNTIME, SafetySystem
 from tvist_controller.motion.setpoints import Setpoints
 from tvist_controller.planning.move_planner import PlannedMove
 from tvist_controller.planning.snapshot import FilterState, PlanningState
-from tvist_controller.refusal import RefusalError, out_of_turn
+from tvist_controller.refusal import out_of_range, out_of_turn, wrong_mode
 from tvist_controller.trajectory import MotionLimits, SetpointStream
-from tvist_plant.plant import PERIOD
 from tvist_protocol.modes import RuntimeState, SafetyMode
 from tvist_protocol.replies import Code
 from tvist_protocol.stream import EventKind
@@ -123,12 +122,14 @@ class MotionControl:
     def pause(self) -> None:
         """Pause the motion on its path, or let it end if it is about to; raise RefusalError if none runs."""
         self.go("pause")
-        self.motions.hold()
+        if (move := self.motions.move) is not None:
+            move.hold()
 
     def resume(self) -> None:
         """Resume a paused motion; raise RefusalError if none is paused."""
         self.go("resume")
-        self.motions.release()
+        if (move := self.motions.move) is not None:
+            move.release(self.motions.wanted_speed, self.motions.slowest)
 
     @property
     def runtime(self) -> RuntimeState:
@@ -159,9 +160,7 @@ class MotionControl:
             raise out_of_turn(trigger, self.activity)
         self.safety.check(trigger, self.activity)
         if target.moving and not (self._moving or self.ready):
-            raise RefusalError(
-                "wrong_mode", "", "the drives of the arm are not ready: wait until they hold it"
-            )
+            raise wrong_mode("the drives of the arm are not ready: wait until they hold it")
         return target
 
     def go(self, trigger: str) -> None:
@@ -172,8 +171,8 @@ class MotionControl:
         """Start to follow set-points; raise RefusalError if busy or above the reduced velocity limit."""
         target = self.check("servo_start")
         if (most := self.motions.slowest) is not None and limits.velocity > most:
-            why = f"velocity is {limits.velocity:g} rad/s; safety_mode is REDUCED, which allows {most:.3g}"
-            raise RefusalError("limit_velocity", "velocity", why, most)
+            must = f"at most {most:.3g} rad/s while safety_mode is REDUCED"
+            raise out_of_range("velocity", f"{limits.velocity:g} rad/s", must, most, "limit_velocity")
         self.activity = target
         self.streams.begin(self._stream(period, limits), now)
 
@@ -185,7 +184,6 @@ class MotionControl:
             cycle.sample.reference,
             period,
             cycle.filter.spared(limits),
-            PERIOD,
             reach=np.array(cycle.description.limits.position),
             torque=StreamTorqueMargin(cycle.description, cycle.dynamics),
         )

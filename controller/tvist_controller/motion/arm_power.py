@@ -65,7 +65,7 @@ class ArmPower:
         """Return why the robot cannot continue, else None; call after every tick."""
         self.begun = False
         if not (np.isfinite(measured.q).all() and np.isfinite(measured.moment).all()):
-            return "the arm has measured what is no number"
+            return "the arm's measurements are not finite numbers"
         timestamp = measured.timestamp
         self._same = self._same + 1 if timestamp is not None and timestamp == self._measured else 0
         self._measured = timestamp

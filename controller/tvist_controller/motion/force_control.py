@@ -10,10 +10,10 @@ import pinocchio as pin
 from tvist_controller.instruments.tool_forces import ToolForces
 from tvist_controller.kinematics.pose import turn
 from tvist_controller.line.differentiator import Floats
-from tvist_controller.line.sample import Sample
+from tvist_controller.line.line_tick import Sample
 from tvist_controller.motion.guidance import Guidance
-from tvist_controller.motion.monitor import Monitor, MonitorFinding
-from tvist_controller.refusal import RefusalError
+from tvist_controller.motion.monitors import Monitor, MonitorFinding
+from tvist_controller.refusal import wrong_mode
 from tvist_controller.trajectory import Compliant, ForceTask
 from tvist_controller.trajectory.compliant import CRAWL, FREE_DAMPING
 from tvist_plant.plant import PERIOD
@@ -147,8 +147,9 @@ class ForceControl(Monitor):
         in `frame_of`. Raise RefusalError if the activity or its motion does not allow it.
         """
         if self._cycle.plant.supervised:
-            why = "this arm follows positions with a lag, and its force is a guess: forces cannot move it"
-            raise RefusalError("wrong_mode", "", why)
+            raise wrong_mode(
+                "this arm follows positions with a lag, and its force is a guess: forces cannot move it"
+            )
         self.check_sensor()
         self._guidance.check(trigger)
         self.awake = True
@@ -172,8 +173,9 @@ class ForceControl(Monitor):
     def check_sensor(self) -> None:
         """Raise RefusalError if an external force sensor in use has sent nothing (yet, or for too long)."""
         if self.external.awaited:
-            why = "the external force sensor has told nothing yet: send its values, every 100 ms at least"
-            raise RefusalError("wrong_mode", "", why)
+            raise wrong_mode(
+                "the external force sensor has sent no value yet: send one at least every 100 ms"
+            )
 
     def sensed(self) -> Floats | None:
         """Return the external sensor's reading for the next tick; call each tick while it has values."""
@@ -202,7 +204,7 @@ class ForceControl(Monitor):
         else:
             inner = guidance.halting(state, guidance.limits.acceleration)
         return Compliant(
-            state, guidance.limits, guidance.reach, guidance.torque, PERIOD, tool=lambda: self._motion.tool,
+            state, guidance.limits, guidance.reach, guidance.torque, tool=lambda: self._motion.tool,
             inner=inner, felt=self._felt,
         )  # fmt: skip
 
@@ -265,7 +267,7 @@ class ForceControl(Monitor):
         self._forces.forget_zero()
         why = f"forces are now those of {source}"
         if self.external.awaited:
-            why = f"the external force sensor has told nothing for {1e3 * SILENT:g} ms: {why}"
+            why = f"the external force sensor has sent no value for {1e3 * SILENT:g} ms: {why}"
         if self._guidance.compliant is not None:
             return MonitorFinding(why, then="interruption")
         return MonitorFinding(why) if self.external.awaited else None
@@ -283,7 +285,7 @@ class ForceControl(Monitor):
         if over[axis] <= 0.0:
             return None
         return (
-            f"the tool is {abs(off[axis]):.3g} off its way in axis {axis} of force mode; limits[{axis}] "
+            f"the tool is {abs(off[axis]):.3g} off its path in axis {axis} of force mode; limits[{axis}] "
             f"is {lead.task.limits[axis]:g}"
         )
 
@@ -320,5 +322,5 @@ def _turned_to(axes: Floats, direction: Floats) -> Floats:
     length = np.linalg.norm(direction)
     if length < FRAME_DEADBAND:
         return axes
-    turned: Floats = np.asarray(pin.Quaternion.FromTwoVectors(axes[:, 1], direction / length).matrix()) @ axes
-    return turned
+    turn_y = pin.Quaternion.FromTwoVectors(axes[:, 1], direction / length)
+    return np.asarray(turn_y.matrix() @ axes)

@@ -10,9 +10,8 @@ from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.limits import GENTLEST_STOP, REBOUND, StreamTorqueMargin, arm_limits
 from tvist_controller.line.line_mode import LineMode
 from tvist_controller.motion.activity_control import MotionControl
-from tvist_controller.refusal import RefusalError
+from tvist_controller.refusal import out_of_range
 from tvist_controller.trajectory import Compliant, Guided, MotionLimits, ServoFollower, Speed
-from tvist_plant.plant import PERIOD
 from tvist_protocol.transitions import Activity
 
 G = TypeVar("G", bound=Guided)
@@ -38,7 +37,7 @@ class Guidance:
     def _rehearse(self) -> None:
         """Compile or load the kernels of a tool motion before a tick needs them."""
         q, still, arm = self.reach * 0.1, np.zeros(len(self.reach)), self.motion.tool
-        speed = Speed((q, still, still), self.limits, self.torque, PERIOD, arm=arm)
+        speed = Speed((q, still, still), self.limits, self.torque, arm=arm)
         speed.aim(arm.jacobian(q)[:, 0] * 1e-3, 1.0, 1.0)
         speed.next()
         rotation, position = arm.pose(q)
@@ -48,7 +47,7 @@ class Guidance:
         """Follow a posture, see `ServoFollower`, and return the motion's number; RefusalError as in `check`."""
         self.check("servo_j", shaped=shaped)
         servo = self._present(ServoFollower, shaped) or ServoFollower(
-            self._start(shaped), self._most(shaped), self.reach, self.torque, PERIOD
+            self._start(shaped), self._most(shaped), self.reach, self.torque
         )
         servo.aim(q, lookahead, gain)
         return self.follow("servo_j", servo, shaped=shaped)
@@ -75,7 +74,7 @@ class Guidance:
         speed = self._present(Speed, shaped)
         if speed is None or speed.arm is not tool:
             rate = self.motion.motions.speed
-            speed = Speed(self._start(shaped), self._most(shaped), self.torque, PERIOD, rate=rate, arm=tool)
+            speed = Speed(self._start(shaped), self._most(shaped), self.torque, rate=rate, arm=tool)
         speed.aim(goal, *accelerations)
         return self.follow(trigger, speed, shaped=shaped)
 
@@ -106,7 +105,7 @@ class Guidance:
             self.stop_joints(fastest / duration if duration > 0.0 else None, "stop_l")
             return
         harder = max(duration * GENTLEST_STOP / fastest, 1.0)
-        stop = Speed(self._start(shaped=False), self.limits, self.torque, PERIOD, arm=tool)
+        stop = Speed(self._start(shaped=False), self.limits, self.torque, arm=tool)
         stop.aim(np.zeros(6), harder * acceleration, harder * angular_acceleration)
         stop.acceleration = harder * fastest / duration
         self._halt("stop_l", stop, stop.duration)
@@ -118,8 +117,9 @@ class Guidance:
         """Raise RefusalError if the present activity does not allow a command."""
         self.motion.check(trigger)
         if shaped and self.motion.activity is not Activity.REST and not self._continues(shaped):
-            why = "shaped is true; it must be false, since this motion does not begin at rest"
-            raise RefusalError("busy", "shaped", why)
+            raise out_of_range(
+                "shaped", "true", "false, since this motion does not begin at rest", code="busy"
+            )
 
     def _continues(self, shaped: bool) -> bool:
         """Return whether a command continues the previous one's reference."""
@@ -168,7 +168,7 @@ class Guidance:
 
     def halting(self, state: tuple[Floats, Floats, Floats], deceleration: float) -> Speed:
         """Return a trajectory from a state to rest with a deceleration [rad/s^2]."""
-        stop = Speed(state, self.limits, self.torque, PERIOD)
+        stop = Speed(state, self.limits, self.torque)
         stop.aim(np.zeros_like(state[0]), deceleration)
         return stop
 

@@ -220,16 +220,6 @@ class Motions:
         if self._running is not None:
             self._running.pace(self.wanted_speed, self.slowest)
 
-    def hold(self) -> None:
-        """Pause a planned motion on its path."""
-        if self.move is not None:
-            self.move.hold()
-
-    def release(self) -> None:
-        """Resume a planned motion."""
-        if self.move is not None:
-            self.move.release(self.wanted_speed, self.slowest)
-
     def done(self) -> None:
         """Report that the shaped reference rests at the target."""
         if self._running is not None:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Literal
 
-from tvist_controller.refusal import RefusalError
+from tvist_controller.refusal import wrong_mode
 from tvist_protocol.modes import RuntimeState, SafetyMode
 from tvist_protocol.transitions import TRANSITIONS, Activity
 from tvist_protocol.values import ResetMode
@@ -15,14 +15,12 @@ _EMERGENCIES = {"robot": SafetyMode.ROBOT_EMERGENCY_STOP, "system": SafetyMode.S
 _LATCHED = {"violation": SafetyMode.VIOLATION, "fault": SafetyMode.FAULT}
 _MOTION = frozenset(
     row.trigger for row in TRANSITIONS if row.target in {Activity.MOVING, Activity.STREAMING, Activity.GUIDED}
-)
-"""Triggers that start motion, from the table of transitions."""
+)  # triggers that start motion, from the table of transitions
 _LIVE = _MOTION | frozenset(
     row.trigger
     for row in TRANSITIONS
     if row.target in {Activity.IDLE, Activity.REST} and row.trigger != "at_rest"
-)
-"""Triggers that power the arm or start motion."""
+)  # triggers that power the arm or start motion
 
 
 @dataclass
@@ -54,7 +52,7 @@ class SafetySystem:
             way_out = "release the safeguard stop first"
         else:
             return
-        raise RefusalError("wrong_mode", "", f"safety_mode is {self.mode(activity).name}: {way_out}")
+        raise wrong_mode(f"safety_mode is {self.mode(activity).name}: {way_out}")
 
     def clear(self) -> None:
         """Release safeguard and emergency stops and clear the latched fault, but keep reduced mode."""
@@ -64,8 +62,9 @@ class SafetySystem:
     def restart(self) -> None:
         """Clear the latched fault; raise RefusalError without one."""
         if self.latched is None:
-            why = "the safety system has found no violation or fault: there is no need to restart it"
-            raise RefusalError("wrong_mode", "", why)
+            raise wrong_mode(
+                "the safety system has found no violation or fault: there is no need to restart it"
+            )
         self.latched = None
 
 
@@ -73,8 +72,7 @@ PUT: dict[ResetMode, Activity] = {
     "RUNNING": Activity.REST,
     "IDLE": Activity.IDLE,
     "POWER_OFF": Activity.POWER_OFF,
-}
-"""Activity at rest in each robot mode."""
+}  # activity at rest in each robot mode
 RUNTIME = {
     Activity.MOVING: RuntimeState.PLAYING,
     Activity.STREAMING: RuntimeState.PLAYING,
@@ -85,8 +83,7 @@ RUNTIME = {
     Activity.POWERING_OFF: RuntimeState.STOPPING,
     Activity.BRAKING: RuntimeState.STOPPING,
     Activity.PROTECTIVE_STOPPING: RuntimeState.STOPPING,
-}
-"""Runtime state of each activity; STOPPED for all others."""
+}  # runtime state of each activity; STOPPED for all others
 
 
 def at_rest(activity: Activity, *, emergency: bool) -> Activity:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tvist_controller.paths.poses import Placement
+from tvist_controller.kinematics.pose import Placement
 from tvist_controller.paths.tool_curves import PER_RADIAN, ToolLine, ToolWay
 from tvist_controller.trajectory.base import Floats
 from tvist_controller.trajectory.spline import Knots
@@ -100,8 +100,7 @@ class Leg:
     @property
     def q(self) -> Floats:
         """Joint positions at its start, shape (n,) [rad]."""
-        start: Floats = self.knots.q[0]
-        return start
+        return np.asarray(self.knots.q[0])
 
 
 class BlendJunction(NamedTuple):
@@ -129,8 +128,7 @@ def _corner(leg: Leg, then: Leg) -> Floats | None:
     change = then.way.first - leg.way.first
     if _size(change) > SHALLOW:
         return None
-    bend: Floats = 2.0 * change / (leg.way.length + then.way.length)
-    return bend
+    return np.asarray(2.0 * change / (leg.way.length + then.way.length))
 
 
 def _meeting(leg: Leg, blend: float, before: Floats, behind: Floats) -> BlendJunction | None:
@@ -154,8 +152,7 @@ def _between(one: Floats, other: Floats) -> Floats:
         return np.zeros_like(one)
     mean = 0.5 * (one + other)
     most = STEEPER * min(float(np.linalg.norm(one)), float(np.linalg.norm(other)))
-    found: Floats = mean * min(most / float(np.linalg.norm(mean)), 1.0)
-    return found
+    return np.asarray(mean * min(most / float(np.linalg.norm(mean)), 1.0))
 
 
 def _size(change: Floats) -> float:

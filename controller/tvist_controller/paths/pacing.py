@@ -206,8 +206,7 @@ def _looks(places: Floats) -> Floats:
 def _largest(values: Floats) -> Floats:
     """Return bounds for each cell of values sampled at `_looks`, shape (c, m)."""
     ends = np.maximum(values[:-1:2], values[2::2])
-    found: Floats = MARGIN * np.maximum(ends, values[1::2])
-    return found
+    return np.asarray(MARGIN * np.maximum(ends, values[1::2]))
 
 
 def timed(pacing: LegSpeed, length: float) -> LegSpeed:

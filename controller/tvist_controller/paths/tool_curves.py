@@ -6,8 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from tvist_controller.kinematics.pose import turn, turned
-from tvist_controller.paths.poses import Placement
+from tvist_controller.kinematics.pose import Placement, turn, turned
 from tvist_controller.trajectory.base import Floats
 from tvist_controller.trajectory.spline import evaluate, hermite
 
@@ -161,8 +160,7 @@ class ToolBlend(ToolCurve):
 
     def _angular(self, s: float) -> Floats:
         value, first, _ = self._polynomial(s)
-        angular: Floats = np.asarray(pin.Jexp3(-value[3:])) @ first[3:]
-        return angular
+        return np.asarray(pin.Jexp3(-value[3:]) @ first[3:])
 
     def _polynomial(self, s: float) -> tuple[Floats, Floats, Floats]:
         value, first, second = self._polynomials(np.array([s]))

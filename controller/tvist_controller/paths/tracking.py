@@ -5,8 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tvist_controller.kinematics.arm import Arm
-from tvist_controller.kinematics.pose import ACCURATE, turn
-from tvist_controller.paths.poses import Placement
+from tvist_controller.kinematics.pose import ACCURATE, Placement, turn
 from tvist_controller.paths.tool_curves import ToolCurve, ToolState
 from tvist_controller.trajectory.base import Floats
 from tvist_controller.trajectory.spline import Knots, hermite
@@ -115,5 +114,4 @@ def _solved(jacobian: Floats, wanted: Floats) -> Floats | None:
         except np.linalg.LinAlgError:
             return None
         return exact
-    least: Floats = np.asarray(np.linalg.lstsq(jacobian, wanted, rcond=1e-9)[0], dtype=np.float64)
-    return least
+    return np.asarray(np.linalg.lstsq(jacobian, wanted, rcond=1e-9)[0], dtype=np.float64)

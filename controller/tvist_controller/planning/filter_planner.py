@@ -11,7 +11,7 @@ from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
 from tvist_controller.line.limits import arm_limits
 from tvist_controller.planning.snapshot import FilterState, PlanningState
-from tvist_controller.refusal import RefusalError
+from tvist_controller.refusal import RefusalError, missing, out_of_range
 from tvist_controller.setup import Setup, paper_payload
 from tvist_controller.sources.calibrations import available, elastic_feed_forward, known_friction, load
 from tvist_controller.sources.mode_source import ModeSource, modal_source
@@ -169,8 +169,7 @@ def wanted_modes(name: str, modes: int, where: str, known: Registry = BUILT_IN) 
     with _refusing(where):
         own = known.modes_of(name, modes)
     if modes not in {1, own}:
-        why = f"modes is {modes}; the filter {name} always has {own}"
-        raise RefusalError("out_of_range", "modes", why, own)
+        raise out_of_range("modes", modes, f"{own} for the filter {name}", own)
     return own
 
 
@@ -193,16 +192,15 @@ def choose_source(command: SetEstimator, setup: Setup) -> ModeSource:
     if command.name == "fixed":
         return _fixed(command, setup)
     if command.name not in ESTIMATORS:
-        known = ", ".join(ESTIMATORS)
-        raise RefusalError("unknown_estimator", "name", f"name is {command.name!r}: this server has {known}")
+        must = f"one of {', '.join(ESTIMATORS)}"
+        raise out_of_range("name", repr(command.name), must, code="unknown_estimator")
     for field in ("f_d", "zeta"):
         if getattr(command, field) is not None:
-            why = f"{field} belongs to the estimator fixed, not to {command.name}"
-            raise RefusalError("out_of_range", field, why)
+            raise out_of_range(field, "given", f"left out for the estimator {command.name}")
     calibration = _calibration(command, setup)
     if calibration.robot != setup.description.robot.model:
-        why = f"calibration.robot is {calibration.robot!r}; this arm is a {setup.description.robot.model}"
-        raise RefusalError("out_of_range", "calibration.robot", why)
+        must = f"{setup.description.robot.model!r}, this arm's model"
+        raise out_of_range("calibration.robot", repr(calibration.robot), must)
     source = ModeSource("modal" if command.name == "modal" else "polynomial", setup.description, calibration)
     with _refusing("calibration", "calibration: "):
         source.estimator(1, setup.payload)
@@ -212,13 +210,9 @@ def choose_source(command: SetEstimator, setup: Setup) -> ModeSource:
 def _fixed(command: SetEstimator, setup: Setup) -> ModeSource:
     f_d, zeta = command.f_d, command.zeta
     if f_d is None or zeta is None:
-        field = "f_d" if f_d is None else "zeta"
-        raise RefusalError(
-            "missing_field", field, f"{field} is missing: the estimator fixed needs f_d and zeta"
-        )
+        raise missing("f_d" if f_d is None else "zeta", "the estimator fixed needs f_d and zeta")
     if command.calibration is not None:
-        why = "calibration belongs to the estimators polynomial and modal, not to fixed"
-        raise RefusalError("out_of_range", "calibration", why)
+        raise out_of_range("calibration", "given", "left out for the estimator fixed")
     with _refusing("zeta"):
         Fixed(f_d, zeta)
     return ModeSource("fixed", setup.description, f_d=f_d, zeta=zeta)
@@ -237,13 +231,11 @@ def _calibration(command: SetEstimator, setup: Setup) -> Calibration:
             return found.calibration
     if command.calibration is None or (own is not None and own.name == command.calibration):
         if own is None:
-            why = "calibration is missing: this server was started without one"
-            raise RefusalError("missing_field", "calibration", why)
+            raise missing("calibration", "this server was started without one")
         return own
     if command.calibration not in available():
-        known = ", ".join(available())
-        why = f"calibration is {command.calibration!r}: must be one of {known}"
-        raise RefusalError("unknown_calibration", "calibration", why)
+        must = f"one of {', '.join(available())}"
+        raise out_of_range("calibration", repr(command.calibration), must, code="unknown_calibration")
     return load(command.calibration)
 
 

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from tvist_controller.foresight.stops import MAX_AHEAD, LineSimulation
+from tvist_controller.kinematics.arm import InverseDynamics
 from tvist_controller.line.differentiator import Floats, ShapedReference, central_differences
-from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.line.line_filter import LineFilter
 from tvist_controller.planning.slower import Binding, Limited, lasts, limit_of
 from tvist_controller.planning.snapshot import PlanningState
@@ -127,7 +127,7 @@ class Fitter:
         ahead = None if found is None or tvist is None else shaped_ahead(motion, tvist())
         if ahead is None:
             return found
-        q, qd, qdd = central_differences(ahead, PERIOD)
+        q, qd, qdd = central_differences(ahead)
         return self._exceeded(q, qd, qdd, np.diff(ahead, axis=0) / PERIOD, now, 1.0)
 
     def _exceeded(
@@ -216,7 +216,7 @@ def keeping_motion(
     share = 1.0 - tvist.excess
     for _ in range(KEEPING_TRIES):
         spared = replace(limits, acceleration=limits.acceleration * share)
-        motion = quickest_motion(path, spared, PERIOD, speed, agility)
+        motion = quickest_motion(path, spared, speed, agility)
         if easy:
             break
         ahead = shaped_ahead(motion, tvist)
@@ -232,7 +232,7 @@ def keeping_motion(
 def shaped_ahead(motion: PlannedMotion, tvist: Filter) -> Floats | None:
     """Return the shaped references at full rate, (k, n) [rad], None if too long; motion and filter stay unchanged."""
     path, mine = motion.path, tvist.fork()
-    shaped = ShapedReference(path.posture(path.start), PERIOD)
+    shaped = ShapedReference(path.posture(path.start))
     shaped.enter(path.posture_of, path.start)
     line_filter = LineFilter(mine, motion.limits)
     line_filter.begin(mine, path.start, path.posture_of)

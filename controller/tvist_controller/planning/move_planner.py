@@ -22,7 +22,6 @@ from tvist_controller.trajectory import (
     at_least,
     quickest_motion,
 )
-from tvist_plant.plant import PERIOD
 from tvist_protocol.commands import MoveJ
 
 AGILE = MotionLimits(1.5, 2.0, 100.0)
@@ -74,7 +73,7 @@ class MovePlanner(Fitter):
             if now.excess > 0.0 and not at_once:
                 return keeping_motion(path, kept, self._filters.like(now.filter), rate, agility)
             spared = replace(kept, acceleration=kept.acceleration * (1.0 - now.excess))
-            return quickest_motion(path, spared, PERIOD, rate, agility)
+            return quickest_motion(path, spared, rate, agility)
 
         tvist = None if at_once else lambda: self._filters.like(now.filter)
         try:
@@ -104,7 +103,7 @@ class MovePlanner(Fitter):
         """Return limits with which a motion takes a duration [s], or the arm's if it takes longer anyway."""
         limits = arm_limits(self._description)
         spared = replace(limits, acceleration=limits.acceleration * (1.0 - now.excess))
-        slower = min(quickest_motion(path, spared, PERIOD).duration / duration, 1.0)
+        slower = min(quickest_motion(path, spared).duration / duration, 1.0)
         if slower == 0.0:
             return limits
         return MotionLimits(

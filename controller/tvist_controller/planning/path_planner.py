@@ -36,7 +36,6 @@ from tvist_controller.trajectory import (
 )
 from tvist_controller.trajectory.retiming import RetimedLaw
 from tvist_controller.trajectory.spline import Knots, SplineCurve
-from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import MoveC, MoveL, MovePath
 from tvist_shaping.base import Filter
 
@@ -165,8 +164,8 @@ class PathPlanner:
     ) -> PlannedMove:
         """Plan a motion from rest along a run of a route with `count` segments."""
         if not run:  # already there
-            still = JointLine(now.q, now.q)
-            motion = quickest_motion(still, arm_limits(self._description), PERIOD, now.speed)
+            limits = arm_limits(self._description)
+            motion = quickest_motion(JointLine(now.q, now.q), limits, now.speed)
             return PlannedMove((motion,), 0.0, None, window=0.0, peak=tvist.peak)
         curve, joints = self._curve(joined(run), run, tvist, now)
         delay, ground = self._delay(curve, tvist), ground_of(run, curve)
@@ -202,7 +201,7 @@ class PathPlanner:
     @staticmethod
     def _planned(curve: SplineCurve, law: RetimedLaw, rate: float) -> PlannedMotion:
         agility = at_least(law.limits, AGILE.acceleration, AGILE.jerk)
-        return PlannedMotion(curve, law, PERIOD, rate, agility)
+        return PlannedMotion(curve, law, rate, agility)
 
     @staticmethod
     def _delay(curve: SplineCurve, tvist: Filter) -> float:

@@ -5,10 +5,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from tvist_controller.kinematics.inverse import InverseKinematics, InverseKinematicsError
+from tvist_controller.kinematics.pose import Placement, placement
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.paths.legs import JointWay, Leg, LegSpeed
 from tvist_controller.paths.pacing import timed
-from tvist_controller.paths.poses import Placement, placement
 from tvist_controller.paths.tool_curves import PER_RADIAN, SHORTEST, ToolArc, ToolLine, ToolWay
 from tvist_controller.paths.tracking import Tracker, WayError
 from tvist_controller.planning.snapshot import PlanningState
@@ -16,16 +16,7 @@ from tvist_controller.refusal import RefusalError, check_joints
 from tvist_controller.trajectory.spline import Knots
 from tvist_plant.description import RobotDescription
 from tvist_protocol import kinematics as k
-from tvist_protocol.motions import (
-    ArcSegment,
-    JointSegment,
-    LineSegment,
-    MoveC,
-    MoveL,
-    MovePath,
-    ProcessSegment,
-    Segment,
-)
+from tvist_protocol import motions as m
 from tvist_protocol.replies import Posture, ToolPose
 
 
@@ -79,17 +70,18 @@ class Reachable:
         why = f"{at}, the arm passes a singular posture (near [{near}] rad): go round it, or move there with move_j"
         return RefusalError("singular", field, why)
 
-    def legs(self, command: MoveL | MoveC | MovePath, tracker: Tracker, now: PlanningState) -> Iterator[Leg]:
+    def legs(
+        self, command: m.MoveL | m.MoveC | m.MovePath, tracker: Tracker, now: PlanningState
+    ) -> Iterator[Leg]:
         """Yield the parts of a command's path that move the arm; raise RefusalError if impossible."""
         frame, q = placement(command.frame), now.q
-        before = 0 if now.after is None else now.after.segments
-        for segment, where in _segments(command, before):
+        for segment, where in _segments(command, 0 if now.after is None else now.after.segments):
             start = tracker.pose(q)
             way: ToolWay | JointWay
             match segment:
-                case JointSegment():
+                case m.JointSegment():
                     way = JointWay(q, np.array(segment.q, dtype=float))
-                case ArcSegment() | MoveC():
+                case m.ArcSegment() | m.MoveC():
                     via = frame @ placement(segment.via)
                     end = frame @ placement(segment.pose)
                     try:
@@ -105,7 +97,7 @@ class Reachable:
             knots = self._along(way, q, tracker, where, now)
             q = way.end if isinstance(way, JointWay) else knots.q[-1]
             pacing = timed(_pacing(segment), way.length)
-            blend = 0.0 if isinstance(segment, MoveL | MoveC) else segment.blend
+            blend = 0.0 if isinstance(segment, m.MoveL | m.MoveC) else segment.blend
             yield Leg(way, knots, tracker.pose(q), pacing, blend, where)
 
     def _along(
@@ -134,7 +126,7 @@ class Reachable:
         name = self._description.robot.joints[joint]
         why = (
             f"{field}: joint {name} would be at {q[first, joint]:.3f} rad after {100.0 * shares[first]:.0f} % of the "
-            f"way; it goes to ±{most[joint]:g}"
+            f"way: must be within ±{most[joint]:g} rad"
         )
         raise RefusalError("limit_position", field, why, float(most[joint]))
 
@@ -144,22 +136,22 @@ def _shown(pose: Placement) -> str:
 
 
 def _segments(
-    command: MoveL | MoveC | MovePath, before: int
-) -> Iterator[tuple[MoveL | MoveC | Segment, str]]:
-    if not isinstance(command, MovePath):
+    command: m.MoveL | m.MoveC | m.MovePath, before: int
+) -> Iterator[tuple[m.MoveL | m.MoveC | m.Segment, str]]:
+    if not isinstance(command, m.MovePath):
         yield command, ""
         return
     for number, segment in enumerate(command.segments):
         yield segment, f"segments[{before + number}]"
 
 
-def _pacing(segment: MoveL | MoveC | Segment) -> LegSpeed:
+def _pacing(segment: m.MoveL | m.MoveC | m.Segment) -> LegSpeed:
     match segment:
-        case JointSegment():
+        case m.JointSegment():
             return LegSpeed(
                 PER_RADIAN * segment.velocity, PER_RADIAN * segment.acceleration, segment.duration
             )
-        case LineSegment() | MoveL():
+        case m.LineSegment() | m.MoveL():
             return LegSpeed(segment.velocity, segment.acceleration, segment.duration)
-        case ProcessSegment() | ArcSegment() | MoveC():
+        case m.ProcessSegment() | m.ArcSegment() | m.MoveC():
             return LegSpeed(segment.velocity, segment.acceleration, even=True)

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from tvist_controller.programs.access import Access, refusals_as_faults
-from tvist_controller.programs.journey import Journey, RateLimit, Turns
+from tvist_controller.programs.blended_moves import BlendedMoves, RateLimit, Turns
 from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import Segment
 from tvist_protocol.stream import Event
@@ -12,7 +12,7 @@ from tvist_protocol.transitions import Activity, after
 from tvist_urscript import Fault, Machine
 
 BRAKING = 2.0  # deceleration of the fastest joint before a move that follows an unfinished motion [rad/s^2]
-AGAIN = 10  # ticks in which a thread may restart force mode after a pause or protective stop ended it
+RESTART_TICKS = 10  # ticks in which a thread may restart force mode after a pause or protective stop ended it
 LOST = (
     "force mode has ended, by a pause or a protective stop, and the arm does not move on without it: call force_mode "
     "again, or end_force_mode, before it moves"
@@ -41,12 +41,12 @@ class ProgramArm:
         self._inside: object | None = None  # thread whose move has not returned yet
         self.driver: tuple[Machine, int] | None = None
         """Program and thread number that started the guided motion."""
-        self._journeys: dict[object, Journey] = {}  # blended moves of each thread, until the last one is done
-        self._journey: Journey | None = None  # the journey in progress
+        self._blended: dict[object, BlendedMoves] = {}  # moves of each thread, until the last one is done
+        self._current: BlendedMoves | None = None  # the moves in progress
         self._guided: int | None = None
         self._abandoned = False
         self._asked = 0  # number of threads waiting to start compliance
-        self._gives: object | None = None  # program that made the arm compliant, until it ends that
+        self._complying: object | None = None  # program that made the arm compliant, until it ends that
         self.lead: Callable[[Segment], Turns] | None = None  # makes a move while the arm is compliant
         self.waypoint: Segment | None = None  # target of the present or last move
 
@@ -55,85 +55,85 @@ class ProgramArm:
     def follow(self, segment: Segment) -> Turns:
         """Move along a part of a path; if it blends into the next, the program continues meanwhile."""
         self._check_alone()
-        journey = self._present()
-        if journey is None:
-            journey = Journey(self._access, self._thread(), self._rate_limit, self._come_to_rest)
-            self._journeys[self._thread()] = journey
-        journey.add(segment)
-        if journey.begun:
+        moves = self._present()
+        if moves is None:
+            moves = BlendedMoves(self._access, self._thread(), self._rate_limit, self._come_to_rest)
+            self._blended[self._thread()] = moves
+        moves.add(segment)
+        if moves.begun:
             self.waypoint = segment
-        journey.closed = segment.blend == 0.0
-        yield from self._carry_out(journey)
+        moves.closed = segment.blend == 0.0
+        yield from self._carry_out(moves)
 
     def begin(self) -> None:
         """Start this thread's waiting moves, which can still be extended."""
-        journey = self._present()
-        if journey is not None and not journey.begun:
+        moves = self._present()
+        if moves is not None and not moves.begun:
             self._check_alone()
-            self._begin(journey)
+            self._begin(moves)
 
     def finish(self) -> Turns:
         """Complete this thread's moves without another blend."""
-        journey = self._present()
-        if journey is not None:
-            journey.closed = True
-            yield from self._carry_out(journey)
+        moves = self._present()
+        if moves is not None:
+            moves.closed = True
+            yield from self._carry_out(moves)
 
-    def _carry_out(self, journey: Journey) -> Turns:
-        """Carry out a journey until it is over or accepts another move."""
-        if not (journey.closed or journey.full):
+    def _carry_out(self, moves: BlendedMoves) -> Turns:
+        """Carry out moves until they are over or another one may be added."""
+        if not (moves.closed or moves.full):
             return
         with self._moving():
-            self._begin(journey)
-            while not (journey.over or self._led(journey)) and (journey.closed or journey.full):
+            self._begin(moves)
+            while not (moves.over or self._led(moves)) and (moves.closed or moves.full):
                 yield
-        if self._led(journey):
+        if self._led(moves):
             assert self.lead is not None, "who makes moves can lead them"
-            for segment, effects in journey.hand_over():
+            for segment, effects in moves.hand_over():
                 yield from self.lead(segment)
                 for effect in effects:
                     effect()
         self._present()
 
-    def _led(self, journey: Journey) -> bool:
+    def _led(self, moves: BlendedMoves) -> bool:
         """Return whether another thread made the arm compliant, so that force control must lead moves."""
-        waits = journey.number is None and not journey.over
+        waits = moves.number is None and not moves.over
         return waits and self._access.guidance.compliant is not None
 
-    def _present(self) -> Journey | None:
+    def _present(self) -> BlendedMoves | None:
         """Return this thread's moves that can be blended with another one."""
-        journey = self._journeys.get(self._thread())
-        if journey is None or not journey.over:
-            return journey
-        del self._journeys[self._thread()]
-        if journey.fault is not None:
-            raise journey.fault
+        moves = self._blended.get(self._thread())
+        if moves is None or not moves.over:
+            return moves
+        del self._blended[self._thread()]
+        if moves.fault is not None:
+            raise moves.fault
         return None
 
-    def _begin(self, journey: Journey) -> None:
-        self._journey = journey
-        if not journey.begun:
-            self.waypoint = journey.legs[-1]
-            journey.step()
+    def _begin(self, moves: BlendedMoves) -> None:
+        self._current = moves
+        if not moves.begun:
+            self.waypoint = moves.legs[-1]
+            moves.step()
 
     def advance(self) -> None:
         """Continue the moves in progress; called first in every tick unless the program is paused."""
-        if self._journey is not None and self._journey.begun:
-            self._journey.step()
+        if self._current is not None and self._current.begun:
+            self._current.step()
 
     def then(self, effect: Callable[[], None]) -> None:
         """Do something now, or at the start of the blend after this thread's last waiting move."""
-        journey = self._present()
-        if journey is None:
+        moves = self._present()
+        if moves is None:
             effect()
         else:
-            journey.then(effect)
+            moves.then(effect)
 
     @property
     def end(self) -> Segment | None:
         """This thread's last waiting move."""
-        journey = self._present()
-        return None if journey is None else journey.legs[-1]
+        moves = self._present()
+        return None if moves is None else moves.legs[-1]
 
     def _come_to_rest(self) -> Turns:
         """Stop what still moves; a protective stop in this tick pauses the program here."""
@@ -166,19 +166,19 @@ class ProgramArm:
 
     def regain(self) -> Turns:
         """Wait for the end of a stop, and for a thread to restart a lost force mode; else raise Fault."""
-        left = AGAIN
-        while (stopping := self._stopping("speed_j")) or (self.lost and left > 0):
+        left = RESTART_TICKS
+        while (stopping := self._stopping("speed_j")) or (self.compliance_lost and left > 0):
             left -= not (stopping or self._asked)
             yield
-        if self.lost:
+        if self.compliance_lost:
             raise Fault(LOST)
 
     @property
-    def lost(self) -> bool:
+    def compliance_lost(self) -> bool:
         """Whether a stop has ended a force mode that the program started."""
-        return self._gives is self._thread()[0] and self._access.guidance.compliant is None
+        return self._complying is self._thread()[0] and self._access.guidance.compliant is None
 
-    def give_way(self, start: Callable[[], int]) -> Turns:
+    def start_compliance(self, start: Callable[[], int]) -> Turns:
         """Start or change compliance; `start` does that and returns the motion's number."""
         yield from self.finish()
         self._asked += 1
@@ -190,11 +190,11 @@ class ProgramArm:
             self._replace(start)
         finally:
             self._asked -= 1
-        self._gives = self._thread()[0]
+        self._complying = self._thread()[0]
 
-    def hold_again(self, *, by_hand: bool) -> None:
-        """End freedrive or force mode started by `give_way`."""
-        force, self._gives = self._access.force, None
+    def end_compliance(self, *, by_hand: bool) -> None:
+        """End freedrive or force mode started by `start_compliance`."""
+        force, self._complying = self._access.force, None
         if force.by_hand == by_hand and self._access.guidance.compliant is not None:
             self.brake(force.end, wholly=True)
 
@@ -207,7 +207,7 @@ class ProgramArm:
             motion.activity is Activity.REST
             or (motion.activity is Activity.GUIDED and motion.cycle.mode.shaped)
         )
-        self._journey = None
+        self._current = None
         self._replace(lambda: start(shaped))
         self.driver = None if self._guided is None else self._thread()
 
@@ -240,13 +240,13 @@ class ProgramArm:
 
     def abort(self) -> None:
         """Stop the program's present planned move, if any, and continue as if it had ended."""
-        journey = self._journey
-        if journey is None:
+        moves = self._current
+        if moves is None:
             return
-        journey.skipped = True
-        if journey.number is not None:
+        moves.skipped = True
+        if moves.number is not None:
             self.brake(lambda: self._access.guidance.stop_joints(BRAKING))
-            journey.outcome = "motion_done"
+            moves.outcome = "motion_done"
 
     def brake(self, stop: Callable[[], None], *, wholly: bool = False) -> None:
         """Stop the present motion at the program's request; compliance only ends if `wholly`."""
@@ -255,8 +255,8 @@ class ProgramArm:
             self._rate_limit.charge()
         guided, self._guided = self._guided, None  # so that `hear` ignores its end
         self.driver, self._abandoned = None, False
-        if self._journey is not None:
-            self._journey.number = None
+        if self._current is not None:
+            self._current.number = None
         if wholly or guidance.compliant is None:
             stop()
         else:
@@ -274,7 +274,7 @@ class ProgramArm:
     @property
     def moves(self) -> bool:
         """Whether a planned motion of the program is running."""
-        return self._journey is not None and self._journey.number is not None
+        return self._current is not None and self._current.number is not None
 
     @property
     def guides(self) -> bool:
@@ -284,46 +284,46 @@ class ProgramArm:
     def settle(self) -> None:
         """Stop a motion whose thread has ended without a successor; called at the end of each turn."""
         self._rate_limit.planning = max(self._rate_limit.planning - 1, 0)
-        journey = self._journey
-        if journey is not None and not (journey.over or self._lives(journey.owner)):
-            self._abandoned |= journey.number is not None
-            self._journey = None
+        moves = self._current
+        if moves is not None and not (moves.over or self._lives(moves.owner)):
+            self._abandoned |= moves.number is not None
+            self._current = None
         if self.driver is not None and not self._lives(self.driver):
             self._abandoned = True
         if self._abandoned:
             self.brake(lambda: self._motion.stop(None, "the thread that moved the arm has ended"))
-        for thread in [thread for thread in self._journeys if not self._lives(thread)]:
-            del self._journeys[thread]
+        for thread in [thread for thread in self._blended if not self._lives(thread)]:
+            del self._blended[thread]
 
     def forget(self) -> None:
         """Forget all motions after the program's end."""
-        self._inside = self.driver = self._journey = self._guided = self._gives = None
-        self._journeys.clear()
+        self._inside = self.driver = self._current = self._guided = self._complying = None
+        self._blended.clear()
         self._abandoned, self._rate_limit.planning = False, 0
 
     def hear(self, event: Event) -> bool:
         """Handle an event; return whether it ended a motion against the program's will."""
-        journey = self._journey
-        moving = None if journey is None else journey.number
+        moves = self._current
+        moving = None if moves is None else moves.number
         if event.kind == "protective_stop":
             self._guided = self.driver = None
-            if journey is not None and moving is not None:
-                journey.stop()
+            if moves is not None and moving is not None:
+                moves.stop()
         if event.id is None or event.id not in {moving, self._guided}:
             return False
         stopped = event.kind == "motion_stopped" and event.code != "plant_failure"
-        if event.id == moving and journey is not None:
-            stopped = stopped and journey.outcome is None
+        if event.id == moving and moves is not None:
+            stopped = stopped and moves.outcome is None
             if event.kind in {"motion_done", "motion_stopped"}:
-                journey.outcome, journey.number = event.kind, None
+                moves.outcome, moves.number = event.kind, None
         if event.kind == "motion_stopped":
             self._guided = None
         return stopped
 
     def _check_alone(self) -> None:
-        journey, owner = self._journey, None
-        if journey is not None and not journey.over and self._lives(journey.owner):
-            owner = journey.owner
+        moves, owner = self._current, None
+        if moves is not None and not moves.over and self._lives(moves.owner):
+            owner = moves.owner
         if {self._inside, owner} - {None, self._thread()}:
             raise Fault(TAKEN)
 

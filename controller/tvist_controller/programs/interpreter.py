@@ -7,7 +7,7 @@ from typing import Literal
 from tvist_controller.events import Emit
 from tvist_controller.instruments.peripherals import Peripherals
 from tvist_controller.programs.arm import ProgramArm
-from tvist_controller.programs.journey import Turns
+from tvist_controller.programs.blended_moves import Turns
 from tvist_controller.refusal import RefusalError
 from tvist_protocol.programs import MAX_SCRIPT, Interpreter
 from tvist_urscript import Fault, Machine, Script

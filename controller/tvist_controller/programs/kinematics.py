@@ -6,10 +6,9 @@ import numpy as np
 
 from tvist_controller.kinematics.arm import Arm
 from tvist_controller.kinematics.inverse import InverseKinematics, InverseKinematicsError
-from tvist_controller.kinematics.pose import turn
+from tvist_controller.kinematics.pose import placement, placement_vector, turn
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.motion.activity_control import MotionControl
-from tvist_controller.paths.poses import placement, placement_vector
 from tvist_plant.description import RobotDescription
 from tvist_urscript import Fault
 
@@ -48,8 +47,7 @@ class ProgramKinematics:
         self, pose: Sequence[float], near: Sequence[float], tcp: Sequence[float] | None = None
     ) -> tuple[float, ...]:
         """Return the joint positions nearest to `near` with a tool pose [rad]."""
-        tool = placement(self._motion.tcp if tcp is None else tcp)
-        flange = placement(pose) @ tool.inverse
+        flange = placement(pose) @ placement(self._motion.tcp if tcp is None else tcp).inverse
         try:
             q = self._inverse.solve(flange.rotation, flange.position, np.array(near, dtype=float))
         except InverseKinematicsError as error:
@@ -58,8 +56,7 @@ class ProgramKinematics:
         finally:
             if self._inverse.searched:
                 self._spend(SEARCH)
-        found: tuple[float, ...] = tuple(q.tolist())
-        return found
+        return tuple(q.tolist())
 
     @staticmethod
     def difference(start: Sequence[float], end: Sequence[float]) -> Floats:

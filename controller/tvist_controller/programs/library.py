@@ -32,16 +32,14 @@ FAMILIES: tuple[type[Family], ...] = (
     StatementFunctions,
     SafetyFunctions,
     GripperFunctions,
-)
-"""All functions, in the order of the documentation."""
+)  # all functions, in the order of the documentation
 
 MOVING = frozenset(names(MotionFunctions)) | {
     "interpreter_mode",
     "force_mode",
     "freedrive_mode",
     "teach_mode",
-}
-"""Functions that move the arm, or let clients move it."""
+}  # functions that move the arm, or let clients move it
 
 
 @cache

@@ -268,8 +268,7 @@ class ProgramPlayer:
         self._begin(script, script.name, origin)
 
     def _begin(self, script: Script, name: str, origin: str | None) -> _Running:
-        machine = Machine(script, self._functions, finish=self.arm.finish)
-        running = _Running(name, machine, origin)
+        running = _Running(name, Machine(script, self._functions, finish=self.arm.finish), origin)
         self._all.append(running)
         self.idle = False
         self._emit("program_started", program=name, secondary=script.secondary or None)

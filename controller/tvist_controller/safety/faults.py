@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tvist_controller.motion.activity_control import MotionControl
-from tvist_controller.refusal import RefusalError
+from tvist_controller.refusal import RefusalError, missing, out_of_range
 from tvist_controller.safety.safety_control import SafetyControl
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD, Plant
@@ -23,18 +23,15 @@ def check_fault(command: SimulationInject, description: RobotDescription) -> Non
     joints = description.joints
     fault = FAULTS.get(command.fault)
     if fault is None:
-        why = f"fault is {command.fault!r}: must be one of {', '.join(FAULTS)}"
-        raise RefusalError("unknown_fault", "fault", why)
+        raise out_of_range("fault", repr(command.fault), f"one of {', '.join(FAULTS)}", code="unknown_fault")
     for field in ("joint", "value", "seconds"):
         given = getattr(command, field) is not None
         if field in fault.needs and not given:
-            raise RefusalError("missing_field", field, f"{field} is missing: fault {command.fault} needs it")
+            raise missing(field, f"fault {command.fault} needs it")
         if given and field not in (*fault.needs, *fault.may):
-            why = f"{field} does not belong to fault {command.fault}"
-            raise RefusalError("out_of_range", field, why)
+            raise out_of_range(field, "given", f"left out for fault {command.fault}")
     if command.joint is not None and command.joint >= joints:
-        why = f"joint is {command.joint}; the arm's joints are 0 to {joints - 1}"
-        raise RefusalError("out_of_range", "joint", why, joints - 1)
+        raise out_of_range("joint", command.joint, f"from 0 to {joints - 1}", joints - 1)
 
 
 _NEEDED: dict[str, Callable[..., Any]] = {"torque": Plant.push, "nan": Plant.make_nan}
@@ -45,15 +42,15 @@ class Faults:
     """Starts faults, and ends those with a duration."""
 
     def __init__(self, motion: MotionControl, safety: SafetyControl) -> None:
+        pressed = motion.safety.emergencies
         self._inputs: dict[str, tuple[Callable[[], None], Callable[[], None]]] = {
             "reduced": (partial(safety.reduce, reduced=True), partial(safety.reduce, reduced=False)),
             "safeguard_stop": (
                 partial(safety.safeguard, stopped=True), partial(safety.safeguard, stopped=False),
             ),
-            "emergency_stop": (partial(safety.emergency, "robot"), partial(safety.end_emergency, "robot")),
-            "system_emergency_stop": (
-                partial(safety.emergency, "system"), partial(safety.end_emergency, "system"),
-            ),
+            # The power stays off after the release of an emergency stop.
+            "emergency_stop": (partial(safety.emergency, "robot"), partial(pressed.discard, "robot")),
+            "system_emergency_stop": (partial(safety.emergency, "system"), partial(pressed.discard, "system")),
         }  # fmt: skip
         """Functions that start and end each safety input."""
         self._momentary: dict[str, Callable[[], None]] = {
@@ -63,8 +60,7 @@ class Faults:
             "violation": lambda: safety.cut_power("the safety system found a violation", "violation"),
             "fault": lambda: safety.cut_power("the safety system failed", "fault"),
             "nan": motion.cycle.plant.make_nan,
-        }
-        """Functions of faults without duration."""
+        }  # functions of faults without duration
         self._plant = motion.cycle.plant
         self._push = np.zeros(motion.cycle.description.joints)
         self._ends: list[tuple[int, str, Callable[[], None]]] = []  # by tick: fault, and what ends it

@@ -5,9 +5,9 @@ import msgspec
 from tvist_controller.events import Emit
 from tvist_controller.instruments.peripherals import Peripherals
 from tvist_controller.line.cycle import ControlCycle
-from tvist_controller.line.sample import Sample
+from tvist_controller.line.line_tick import Sample
 from tvist_controller.motion.activity_control import MotionControl
-from tvist_controller.refusal import RefusalError
+from tvist_controller.refusal import out_of_range, wrong_mode
 from tvist_controller.safety.robot_modes import RobotModes
 from tvist_controller.safety.safety_control import SafetyControl
 from tvist_controller.setup import payload_of
@@ -20,8 +20,7 @@ from tvist_protocol.values import Payload
 REFUSED = (
     "the robot is only watched: its own controller moves and stops it, and nothing is sent to it from here; command it "
     "at its own interfaces or its teach pendant, or serve it with --enable-motion"
-)
-"""Refusal of commands that affect a watched arm."""
+)  # refusal of commands that affect a watched arm
 _NO_STOP = frozenset({SafetyMode.NORMAL, SafetyMode.REDUCED, SafetyMode.UNDEFINED})
 SAME_MASS = 0.05  # mass difference below which masses count as equal [kg]
 
@@ -138,18 +137,19 @@ class Supervision(RemoteStatus):
         if before is None or sight.modes[1] != before.modes[1]:
             self._obey(sight.modes[1])
         if before is not None and sight.payload != before.payload and sight.payload is not None:
-            why = f"the robot was told another payload, {sight.payload.mass:.3g} kg: power off and on to check it"
+            why = f"another payload was set on the robot, {sight.payload.mass:.3g} kg: power off and on to check it"
             self._emit("warning", why=why)
 
     def check(self, command: Command) -> None:
         """Raise RefusalError for commands that this server cannot apply to the robot."""
         if isinstance(command, SetIo | SimulationSetInputs):
-            why = "inputs and outputs are those of the robot, to which only set-points are sent: switch them there"
-            raise RefusalError("wrong_mode", "", why)
+            raise wrong_mode(
+                "inputs and outputs are those of the robot, to which only set-points are sent: switch them there"
+            )
         told = None if self._sight is None else self._sight.payload
         if isinstance(command, SetPayload) and told is not None and abs(command.mass - told.mass) > SAME_MASS:
-            why = f"mass is {command.mass:.3g} kg, and the robot was told {told.mass:.3g} kg: tell it first"
-            raise RefusalError("wrong_mode", "mass", why)
+            must = f"{told.mass:.3g} kg, which is set on the robot: change it there first"
+            raise out_of_range("mass", f"{command.mass:.3g} kg", must, code="wrong_mode")
 
     def io(self, io: Io, *, force: bool) -> Io:
         """Return `io` with the robot's own values, except what clients set here."""

@@ -5,12 +5,10 @@ from typing import ClassVar
 import numpy as np
 
 from tvist_controller._compiled import compiled_for_ticks
-from tvist_controller.kinematics.arm import Arm
+from tvist_controller.kinematics.arm import SLEW, Arm
 from tvist_controller.line.differentiator import Floats
-from tvist_controller.line.inverse_dynamics import SLEW
-from tvist_controller.line.line_tick import QD, QDD, Q
-from tvist_controller.line.sample import Sample
-from tvist_controller.motion.monitor import Monitor, MonitorFinding
+from tvist_controller.line.line_tick import QD, QDD, Q, Sample
+from tvist_controller.motion.monitors import Monitor, MonitorFinding
 from tvist_plant.chain import BODY, torques
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import carries_weight

@@ -9,11 +9,11 @@ from tvist_controller.events import Emit
 from tvist_controller.foresight.stops import StopPlan
 from tvist_controller.line.differentiator import Target
 from tvist_controller.line.limits import REDUCED_SHARE
-from tvist_controller.line.sample import Sample
+from tvist_controller.line.line_tick import Sample
 from tvist_controller.motion.activity_control import MotionControl
-from tvist_controller.motion.monitor import Monitor
+from tvist_controller.motion.monitors import Monitor
 from tvist_controller.motion.safety_system import PUT, Emergency, Latched, at_rest
-from tvist_controller.refusal import RefusalError
+from tvist_controller.refusal import wrong_mode
 from tvist_controller.trajectory import Compliant, SampledPositions
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import FLANGE, payload_inertia, rigid_model
@@ -84,10 +84,6 @@ class SafetyControl:
             why = f"the {whose}'s emergency stop was pressed"
             self._motion.end("power_off", why, kind="safety_stop", category=1)
 
-    def end_emergency(self, whose: Emergency) -> None:
-        """Release an emergency stop; the power stays off."""
-        self._motion.safety.emergencies.discard(whose)
-
     def release(self) -> None:
         """Release reduced speed, safeguard and emergency stops."""
         self.reduce(reduced=False)
@@ -110,7 +106,7 @@ class SafetyControl:
         try:
             self._begin_where_it_stands()
         except ValueError as error:
-            raise RefusalError("wrong_mode", "", str(error)) from error
+            raise wrong_mode(str(error)) from error
         if self._motion.power is not None:
             self._motion.power.halted = None
 
@@ -133,7 +129,7 @@ class SafetyControl:
         target = after(motion.activity, "brakes")
         motion.activity = target or motion.activity
         if target is not None and not cycle.mode.at_rest:
-            stop = brake(cycle.description, cycle.plant.payload, cycle.newest, PERIOD)
+            stop = brake(cycle.description, cycle.plant.payload, cycle.newest)
             way = float(np.abs(stop.end - cycle.position).max())
             plan = StopPlan(None, None, limited=False, duration=stop.duration, way=way)
             motion.stopper.brake(stop)
@@ -246,8 +242,8 @@ class SafetyControl:
         self._restart_monitors()
 
 
-def brake(description: RobotDescription, carried: Payload, state: Target, period: float) -> SampledPositions:
-    """Simulate the rigid arm under its brakes from a state of motion, in ticks of `period` seconds.
+def brake(description: RobotDescription, carried: Payload, state: Target) -> SampledPositions:
+    """Simulate the rigid arm under its brakes from a state of motion, tick by tick.
 
     Each joint is slowed down by its brake, assumed as strong as its drive, and stays at rest afterwards. With rotors:
 
@@ -264,7 +260,7 @@ def brake(description: RobotDescription, carried: Payload, state: Target, period
     q, qd = state.q.copy(), state.qd.copy()
     positions = [q]
     turning = np.abs(qd) > 0.0
-    for _ in range(round(LONGEST_BRAKING / period)):
+    for _ in range(round(LONGEST_BRAKING / PERIOD)):
         if not turning.any():
             break
         mass = np.array(pin.crba(model, data, q, pin.Convention.WORLD)) + np.diag(rotor)
@@ -272,10 +268,10 @@ def brake(description: RobotDescription, carried: Payload, state: Target, period
         torque = np.maximum(strength, HOLD * np.abs(bias)) * np.sign(qd) + bias
         free = np.flatnonzero(turning)
         new = np.zeros_like(qd)
-        new[free] = qd[free] - period * np.linalg.solve(mass[np.ix_(free, free)], torque[free])
+        new[free] = qd[free] - PERIOD * np.linalg.solve(mass[np.ix_(free, free)], torque[free])
         turning &= new * qd > 0.0
         new[~turning] = 0.0
         qd = new
-        q = q + period * qd
+        q = q + PERIOD * qd
         positions.append(q)
-    return SampledPositions(positions[1:] or positions, period)
+    return SampledPositions(positions[1:] or positions)

@@ -68,7 +68,7 @@ class OwnPlant:
                 raise
             raise OwnFileError(f"plant {self.place}: making it raises {named(error)}") from error
         raise OwnFileError(
-            f"plant {self.place}: it makes a {type(made).__name__}, which is no plant: that has payload and step"
+            f"plant {self.place}: it makes a {type(made).__name__}, which is no plant: a plant has payload and step"
         )
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -91,8 +91,8 @@ def load_plant(place: str) -> OwnPlant:
         return OwnPlant(place, "", VARIANTS[place])
     if place.lower().startswith("ur://"):
         raise OwnFileError(
-            f"plant {place}: it is a real arm, which only tvist serve takes: it does not do the same again, so that "
-            "nothing can be replayed or compared with it"
+            f"plant is {place!r}, a real arm, which only tvist serve takes: its motions cannot be repeated for a "
+            "replay or a comparison"
         )
     if place.startswith(WORLD):
         return load_world(place.removeprefix(WORLD))
@@ -102,8 +102,8 @@ def load_plant(place: str) -> OwnPlant:
         sha256, found = "", _installed(place)
     if not callable(found):
         raise OwnFileError(
-            f"plant {place}: it is of type {type(found).__name__}; it must be a class or a function that takes a "
-            "RobotDescription and a Payload, and makes a plant"
+            f"plant {place}: it is of type {type(found).__name__}; it must be a class or a function that makes a plant "
+            "from a RobotDescription and a Payload"
         )
     return OwnPlant(place, sha256, found)
 

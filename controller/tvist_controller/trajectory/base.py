@@ -9,6 +9,7 @@ from typing import NamedTuple, Self
 import numpy as np
 import numpy.typing as npt
 
+from tvist_plant.plant import PERIOD
 from tvist_shaping.base import Posture
 
 Floats = npt.NDArray[np.float64]
@@ -117,18 +118,12 @@ class JointLine(Path):
 class BrakingForecast:
     """When and how hard a trajectory will brake, in its path's parameter, as known without simulation."""
 
-    path: Path
-    """Path of the trajectory."""
-    end: Floats
-    """Parameter at its uninterrupted end, shape (m,) [rad]."""
-    braking: float
-    """Largest future deceleration of the leading entry [rad/s^2]."""
-    jerk: float
-    """Largest future jerk of the leading entry [rad/s^3]."""
-    steady: float
-    """Time before it starts braking, 0 if unknown [s]."""
-    turns: bool = False
-    """Whether it may turn back on its path."""
+    path: Path  # path of the trajectory
+    end: Floats  # parameter at its uninterrupted end, shape (m,) [rad]
+    braking: float  # largest future deceleration of the leading entry [rad/s^2]
+    jerk: float  # largest future jerk of the leading entry [rad/s^3]
+    steady: float  # time before it starts braking, 0 if unknown [s]
+    turns: bool = False  # whether it may turn back on its path
 
 
 class Trajectory(ABC):
@@ -140,8 +135,7 @@ class Trajectory(ABC):
     """Limits of its samples; None if it bypasses the filter or is at rest."""
     acceleration: float = 0.0
     """Acceleration limit of every joint in a stop; 0 for other trajectories [rad/s^2]."""
-    foreseeable: bool = True
-    """Whether it can be simulated ahead; False with external input."""
+    foreseeable: bool = True  # whether it can be simulated ahead; False with external input
 
     @abstractmethod
     def next(self) -> Floats:
@@ -188,16 +182,16 @@ class Rest(Trajectory):
 
 
 class SampledPositions(Trajectory):
-    """A list of positions, shape (n,) [rad], one per tick of `period` seconds; keeps the last."""
+    """A list of positions, shape (n,) [rad], one per tick; keeps the last."""
 
-    def __init__(self, positions: Sequence[Floats], period: float) -> None:
-        self._positions, self._period = positions, period
+    def __init__(self, positions: Sequence[Floats]) -> None:
+        self._positions = positions
         self._ticks = -1
 
     @property
     def duration(self) -> float:
         """Time until the last position [s]."""
-        return len(self._positions) * self._period
+        return len(self._positions) * PERIOD
 
     @property
     def end(self) -> Floats:

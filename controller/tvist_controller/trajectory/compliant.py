@@ -12,6 +12,7 @@ from tvist_controller.trajectory.base import Floats, MotionLimits
 from tvist_controller.trajectory.guided import Guided, LimitedFollower, StuckError
 from tvist_controller.trajectory.limiter import TorqueMargin
 from tvist_controller.trajectory.speed import abrupt
+from tvist_plant.plant import PERIOD
 
 NEWTON = 3  # newton steps from tool pose to joint angles; two suffice for the travel of a tick
 OFF = 1e-5  # pose error in a stiff direction above which the motion cannot continue [m or rad]
@@ -32,23 +33,17 @@ Frame = Callable[[tuple[Floats, Floats], Floats], Floats]
 class ForceTask:
     """Goal of force control per axis of its frame: three directions, then three rotations."""
 
-    compliant: Floats
-    """1 for compliant axes, 0 for stiff ones, shape (6,)."""
-    wrench: Floats
-    """Wanted force and torque of the arm on its environment, shape (6,) [N, N m]."""
+    compliant: Floats  # 1 for compliant axes, 0 for stiff ones, shape (6,)
+    wrench: Floats  # wanted force and torque of the arm on its environment, shape (6,) [N, N m]
     limits: Floats
     """Largest speed of compliant axes [m/s, rad/s], largest deviation of stiff ones [m, rad], shape (6,)."""
-    damping: float = 0.005
-    """Damping parameter in free space: 0 (keeps its speed) to 1 [-]."""
-    gain: float = 1.0
-    """Factor of the difference between wanted and measured wrench, 0 to 2 [-]."""
-    mass: float = MASS
-    """Virtual mass [kg]."""
-    contact_damping: float = CONTACT_DAMPING
-    """Least damping in contact [N s/m]."""
+    damping: float = 0.005  # damping parameter in free space: 0 (keeps its speed) to 1 [-]
+    gain: float = 1.0  # factor of the difference between wanted and measured wrench, 0 to 2 [-]
+    mass: float = MASS  # virtual mass [kg]
+    contact_damping: float = CONTACT_DAMPING  # least damping in contact [N s/m]
 
 
-def compliant_velocity(task: ForceTask, velocity: Floats, felt: Floats, period: float) -> Floats:
+def compliant_velocity(task: ForceTask, velocity: Floats, felt: Floats) -> Floats:
     """Return the velocity of the frame's axes a tick later, shape (6,) [m/s, rad/s].
 
     A compliant axis is a virtual mass with damping, M v̇ = g (w + f) - D v, with wanted wrench w, measured
@@ -61,9 +56,9 @@ def compliant_velocity(task: ForceTask, velocity: Floats, felt: Floats, period: 
     free = FREE_DAMPING * math.sqrt(math.sqrt(task.damping))
     damping = free + max(task.contact_damping - free, 0.0) * touched
     push = task.gain * (task.wrench + felt) / (scale * task.mass)
-    moved = (velocity + period * push) / (1.0 + period * damping / task.mass)
+    moved = (velocity + PERIOD * push) / (1.0 + PERIOD * damping / task.mass)
     moved = np.clip(moved, -task.limits, task.limits)
-    most = period * np.repeat(RELEASE, 3)
+    most = PERIOD * np.repeat(RELEASE, 3)
     released = velocity - np.clip(velocity, -most, most)
     return np.where(task.compliant > 0.0, moved, released)
 
@@ -84,13 +79,12 @@ class Compliant(LimitedFollower):
         limits: MotionLimits,
         reach: Floats,
         torque: TorqueMargin,
-        period: float,
         *,
         tool: Callable[[], Arm],  # of the tool centre point, which may change at any time
         inner: Guided,  # moves the tool otherwise, and continues from the same state
         felt: Callable[[], Floats],  # on the tool centre point in the last tick, base frame [N, N m]
     ) -> None:
-        super().__init__(state, abrupt(limits, period), reach, torque, period)
+        super().__init__(state, abrupt(limits), reach, torque)
         self._tool, self.inner = tool, inner  # reference that moves the tool in stiff axes
         self._felt = felt
         self._speed: tuple[float, float | None] = (1.0, None)
@@ -139,7 +133,7 @@ class Compliant(LimitedFollower):
 
     def adopt(self, limits: MotionLimits) -> None:
         """See `Guided.adopt`."""
-        super().adopt(abrupt(limits, self._period))
+        super().adopt(abrupt(limits))
 
     def pace(self, speed: float, slowest: float | None) -> None:
         """Set the speed of the inner reference, and the velocity limit of both."""
@@ -149,16 +143,16 @@ class Compliant(LimitedFollower):
 
     def next(self) -> Floats:
         """Advance by one tick and return the joint positions; raise StuckError if it cannot continue."""
-        h, task, felt = self._period, self.task, self._felt()
+        task, felt = self.task, self._felt()
         if not np.isfinite(felt).all():
-            raise StuckError("the force at the tool is no number")
+            raise StuckError("the force at the tool is not a finite number")
         if (tool := self._tool()) is not self.kinematics:
             self._task = None
             self._begin(tool)
             self.aim(task, self._frame)
         moved = self._move_inner()
         self.axes = axes = self._frame(self._pose, self._twist[:3])
-        given = compliant_velocity(task, _into(axes, self._given), _into(axes, felt), h)
+        given = compliant_velocity(task, _into(axes, self._given), _into(axes, felt))
         kept = np.where(task.compliant > 0.0, 0.0, _into(axes, moved))
         q, present = self._limiter.q, self._pose
         inverse = self.kinematics.inverse(q)[1]
@@ -167,15 +161,15 @@ class Compliant(LimitedFollower):
         for part in (share, 0.0):  # a singular posture may forbid all of the wanted change
             self._given = _out(axes, part * given)
             self._twist = _out(axes, kept) + self._given
-            self._pose = self._shifted(present, h * self._twist)
+            self._pose = self._shifted(present, PERIOD * self._twist)
             found, error = self.kinematics.near(self._pose, q, inverse, NEWTON)
             if np.abs(error).max() <= OFF:
                 break
         else:
             if not np.abs(np.where(task.compliant > 0.0, 0.0, _into(axes, error))).max() <= OFF:
-                raise StuckError("the joints cannot move the tool on beside the force that it controls")
+                raise StuckError("the joints cannot move the tool further while it controls its force")
             self._drop(found, axes)
-        reached = self._limiter.follow(found, (found - q) / h)
+        reached = self._limiter.follow(found, (found - q) / PERIOD)
         if self._limiter.limited:
             self._drop(reached, axes)
         return reached
@@ -188,7 +182,7 @@ class Compliant(LimitedFollower):
         rotation, position = self._nominal
         self._nominal = there = self.kinematics.pose(self.inner.next())
         way = np.concatenate((there[1] - position, turn(rotation, there[0])))
-        self._moved = way / self._period
+        self._moved = way / PERIOD
         return self._moved
 
     def _shifted(self, pose: tuple[Floats, Floats], way: Floats) -> tuple[Floats, Floats]:

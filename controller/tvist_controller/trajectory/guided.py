@@ -10,6 +10,7 @@ import numpy as np
 
 from tvist_controller.trajectory.base import Floats, MotionLimits, Trajectory
 from tvist_controller.trajectory.limiter import Limiter, TorqueMargin
+from tvist_plant.plant import PERIOD
 
 LOOKAHEAD = (0.03, 0.2)  # range of the time constant [s]
 GAIN = (100.0, 2000.0)  # range of the gain [1/s^2]
@@ -29,8 +30,7 @@ class Guided(Trajectory):
 
     limits: MotionLimits
     foreseeable = False
-    rate: float
-    """Time rate [-]."""
+    rate: float  # time rate [-]
 
     @property
     @abstractmethod
@@ -59,15 +59,14 @@ class LimitedFollower(Guided):
         limits: MotionLimits,
         reach: Floats,  # largest |q| of each joint, shape (n,) [rad]
         torque: TorqueMargin | None,  # None for no limit
-        period: float,  # tick [s]
     ) -> None:
         self.limits = self._arm = limits
-        self._reach, self._torque, self._period = reach, torque, period
+        self._reach, self._torque = reach, torque
         self.rate = 1.0
         self._follow(state)
 
     def _follow(self, state: tuple[Floats, Floats, Floats]) -> None:
-        self._limiter = Limiter(state, self.limits, self._period, self._reach, self._torque)
+        self._limiter = Limiter(state, self.limits, self._reach, self._torque)
 
     @property
     def state(self) -> tuple[Floats, Floats, Floats]:
@@ -102,18 +101,17 @@ class ServoFollower(LimitedFollower):
         limits: MotionLimits,
         reach: Floats,
         torque: TorqueMargin,
-        period: float,
     ) -> None:
-        super().__init__(state, limits, reach, torque, period)
+        super().__init__(state, limits, reach, torque)
         self._q, self._qd = np.array(state[0]), np.array(state[1])
         self.aim(self._q, LOOKAHEAD[0], GAIN[0])
 
     def aim(self, posture: Floats, lookahead: float, gain: float) -> None:
         """Follow another posture; lookahead [s] and gain [1/s^2] are clipped to their ranges."""
         self._posture = np.array(posture, dtype=float)
-        lag = min(max(lookahead, LOOKAHEAD[0]), LOOKAHEAD[1]) + DELAY * self._period
+        lag = min(max(lookahead, LOOKAHEAD[0]), LOOKAHEAD[1]) + DELAY * PERIOD
         k = max(min(max(gain, GAIN[0]), GAIN[1]), DAMPED / lag**2)
-        self._step = _step(k, k * lag, self._period)
+        self._step = _step(k, k * lag)
 
     def fork(self) -> Self:
         """Return an independent copy."""
@@ -126,7 +124,7 @@ class ServoFollower(LimitedFollower):
         ahead = self._q - self._posture
         (a, b), (c, d) = self._step
         ahead, self._qd = a * ahead + b * self._qd, c * ahead + d * self._qd
-        if max(np.abs(ahead).max(), self._period * np.abs(self._qd).max()) <= THERE:
+        if max(np.abs(ahead).max(), PERIOD * np.abs(self._qd).max()) <= THERE:
             self._q, self._qd = self._posture, np.zeros_like(self._qd)
         else:
             self._q = self._posture + ahead
@@ -138,9 +136,9 @@ class ServoFollower(LimitedFollower):
         return bool((self._limiter.q == self._posture).all()) and self._limiter.resting
 
 
-def _step(k: float, damping: float, h: float) -> tuple[tuple[float, float], tuple[float, float]]:
+def _step(k: float, damping: float) -> tuple[tuple[float, float], tuple[float, float]]:
     """Return the exact transition of distance and velocity over a tick of ẍ = -k x - damping ẋ."""
-    decay, square = 0.5 * damping, 0.25 * damping**2 - k
+    h, decay, square = PERIOD, 0.5 * damping, 0.25 * damping**2 - k
     if square > 0.0:
         root = math.sqrt(square)
         even, odd = math.cosh(root * h), math.sinh(root * h) / root

@@ -9,6 +9,7 @@ import ruckig
 
 from tvist_controller._compiled import compiled_for_ticks
 from tvist_controller.trajectory.base import Floats, MotionLimits
+from tvist_plant.plant import PERIOD
 
 Bools = npt.NDArray[np.bool_]
 
@@ -104,18 +105,17 @@ class Limiter:
         self,
         state: tuple[Floats, Floats, Floats],  # q, q̇ and q̈ to start from, each of shape (n,)
         limits: MotionLimits,
-        period: float,  # tick [s]
         reach: Floats,  # largest |q| of each joint, shape (n,) [rad]
         torque: TorqueMargin | None,  # None for no limit
     ) -> None:
         (q, qd, qdd), n = state, len(state[0])
-        self._limits, self._period = limits, period
+        self._limits = limits
         self._reach = np.array(reach, dtype=float)
         self._torque = torque
         self.q = np.array(q, dtype=float)  # position of the reference, shape (n,) [rad]
         # Velocity of the signal; differences of the reference, and its second difference a tick earlier.
-        self._signal_qd, self._bend_before, self._now = qd, period * period * qdd, np.zeros((DIFFERENCES, n))
-        self._now[STEP], self._now[BEND] = period * (qd - 0.5 * period * qdd), self._bend_before
+        self._signal_qd, self._bend_before, self._now = qd, PERIOD * PERIOD * qdd, np.zeros((DIFFERENCES, n))
+        self._now[STEP], self._now[BEND] = PERIOD * (qd - 0.5 * PERIOD * qdd), self._bend_before
         self._state: Floats | None = np.stack(
             state
         )  # derivatives, if they differ from those of the differences
@@ -127,9 +127,9 @@ class Limiter:
         lasting = max(swing + ramp, 2.0 * math.sqrt(limits.velocity / limits.jerk))
         inner = float(self._reach.min()) - 2.0 * limits.velocity * (ramp + lasting)
         self._most = (
-            limits.velocity * period, limits.acceleration * period**2, limits.jerk * period**3, period, inner,
+            limits.velocity * PERIOD, limits.acceleration * PERIOD**2, limits.jerk * PERIOD**3, PERIOD, inner,
         )  # fmt: skip
-        self._catcher, self._brake = ruckig.Ruckig(n, period), ruckig.Ruckig(n, period)
+        self._catcher, self._brake = ruckig.Ruckig(n, PERIOD), ruckig.Ruckig(n, PERIOD)
         self._catch_request, self._brake_request = ruckig.InputParameter(n), ruckig.InputParameter(n)
         self._brake_request.control_interface = ruckig.ControlInterface.Velocity
         for request in (self._catch_request, self._brake_request):
@@ -179,7 +179,7 @@ class Limiter:
 
     def _passed(self, q: Floats, now: Floats, bend_before: Floats | None = None) -> Floats:
         """Return the state (3, n) of joints on the signal, from the cubic through the last four positions."""
-        h, limit, step, bend = self._period, self._limits.acceleration, now[STEP], now[BEND]
+        h, limit, step, bend = PERIOD, self._limits.acceleration, now[STEP], now[BEND]
         change = bend - (self._now[BEND] if bend_before is None else bend_before)
         mean = bend / (h * h)
         # The mean acceleration was within the limit, so the present one is clamped to the limit as well.
@@ -188,7 +188,7 @@ class Limiter:
 
     def _meets(self, qd: Floats, now: Floats) -> Bools:
         """Return the joints that can continue on the signal within limits if placed there now."""
-        h, limits, step, bend = self._period, self._limits, now[STEP], now[BEND]
+        h, limits, step, bend = PERIOD, self._limits, now[STEP], now[BEND]
         signal = self._signal_acceleration(qd, limits.acceleration)
         following = (qd - step / h) / h + 0.5 * signal  # second difference at the next tick
         meets: Bools = np.abs(following) <= limits.acceleration
@@ -217,13 +217,13 @@ class Limiter:
         falling = top * ramp - jerk * ramp**3 / 6.0
         way = stop + np.where(rise > 0.0, rising, -falling)
         way = np.where((rise < 0.0) & (speed <= 0.5 * jerk * ramp**2), speed * ramp, way)
-        inside: Bools = sign * q + way + 2.0 * self._period * speed <= self._reach
+        inside: Bools = sign * q + way + 2.0 * PERIOD * speed <= self._reach
         inside |= sign * q <= sign * self.q
         return inside
 
     def _time_behind(self, q: Floats, qd: Floats, reference: Floats) -> float:
         limits, speed = self._limits, np.abs(qd)
-        at_limit = np.abs(qd - self._signal_qd) > self.HOPELESS * limits.acceleration * self._period
+        at_limit = np.abs(qd - self._signal_qd) > self.HOPELESS * limits.acceleration * PERIOD
         at_limit |= speed > self.HOPELESS * limits.velocity
         at_limit &= speed > (1.0 - self.HOPELESS) * limits.velocity
         times = np.where(at_limit, (q - reference) * np.sign(qd), 0.0) / np.maximum(speed, 1e-9)
@@ -231,8 +231,7 @@ class Limiter:
 
     def _signal_acceleration(self, qd: Floats, limit: float) -> Floats:
         most = (1.0 - self.AUTHORITY) * limit
-        clipped: Floats = np.clip((qd - self._signal_qd) / self._period, -most, most)
-        return clipped
+        return np.asarray(np.clip((qd - self._signal_qd) / PERIOD, -most, most))
 
     def _held_back(self, q: Floats, qd: Floats, passed: Floats, fits: Bools) -> tuple[Floats, Bools]:
         """Return the state (3, n) if not all joints pass unchanged, and which do."""
@@ -259,7 +258,7 @@ class Limiter:
 
     def _catch_up(self, q: Floats, qd: Floats, limit: float, fits: Bools) -> Floats:
         """Return the state (3, n) a tick later when catching up with a signal of constant acceleration."""
-        request, limits, h = self._catch_request, self._limits, self._period
+        request, limits, h = self._catch_request, self._limits, PERIOD
         fastest = (1.0 - self.ADVANTAGE) * limits.velocity
         present = self.state
         qdd = self._signal_acceleration(qd, limit)
@@ -281,7 +280,7 @@ class Limiter:
 
     def _change_to(self, qd: Floats, limit: float) -> Floats:
         """Return the state (3, n) a tick later on the shortest way to a velocity."""
-        request, h = self._brake_request, self._period
+        request, h = self._brake_request, PERIOD
         present = self.state
         request.current_position, request.current_velocity = present[0].tolist(), present[1].tolist()
         request.current_acceleration = present[2].tolist()

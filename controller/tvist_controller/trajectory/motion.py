@@ -10,6 +10,7 @@ import ruckig
 from tvist_controller.trajectory.base import BrakingForecast, Floats, MotionLimits, Path, Trajectory
 from tvist_controller.trajectory.retiming import RetimedLaw
 from tvist_controller.trajectory.spline import SplineCurve
+from tvist_plant.plant import PERIOD
 
 QUICKEST = 20.0  # largest change of the rate; from standstill to full speed takes at least 1/20 s [1/s]
 
@@ -19,18 +20,18 @@ class TimeScaling:
 
     Along a path q(s) with ṡ = r the acceleration is q̈ = q'' r² + q' ṙ. ṙ may have any value that keeps |q̈| within
     every joint's limit, so near the limits the rate does not change until the curve leaves room. The rate approaches
-    its target time-optimally within that room, with limited jerk (ruckig), in ticks of `period` seconds.
+    its target time-optimally within that room, with limited jerk (ruckig).
     """
 
-    def __init__(self, limits: MotionLimits, period: float, rate: float) -> None:
-        self.limits, self._period = limits, period
+    def __init__(self, limits: MotionLimits, rate: float) -> None:
+        self.limits = limits
         self.acceleration = limits.acceleration
         """Acceleration limit of every joint, the motion's or less [rad/s^2]."""
         self.rate, self._slope = rate, 0.0
         self._open()
 
     def _open(self) -> None:
-        self._generator = ruckig.Ruckig(1, self._period)
+        self._generator = ruckig.Ruckig(1, PERIOD)
         self._request, self._result = ruckig.InputParameter(1), ruckig.OutputParameter(1)
         self._request.control_interface = ruckig.ControlInterface.Velocity
 
@@ -142,24 +143,17 @@ class PlannedMotion(Trajectory):
         self,
         path: Path,
         law: DoubleS | RetimedLaw,  # from the path's start to its end
-        period: float,  # tick [s]
         speed: float = 1.0,  # initial rate of its time relative to the clock's [-]
         agility: MotionLimits | None = None,  # of a change of the rate; None for those of the law
     ) -> None:
-        self.path, self._period = path, period
-        self.law = law
+        self.path, self.law = path, law
         self.agility = law.limits if agility is None else agility  # limits of a rate change
         self.limits = law.limits
         self.duration = law.duration  # duration at full speed [s]
         self.speed = speed  # target time rate, 0 to 1 [-]
-        self._pace = TimeScaling(self.agility, period, speed)
+        self._pace = TimeScaling(self.agility, speed)
         # Time on the path, as whole ticks since the rate last changed, so that rounding errors do not add up.
         self._since, self._ticks = 0.0, 0
-
-    @property
-    def share(self) -> float:
-        """Completed fraction of the way, 0 to 1 [-]."""
-        return 1.0 if self.finished else self._share_at(self.time)
 
     def time_at(self, share: float) -> float:
         """Return the time at full speed at which a fraction of the way, 0 to 1, is completed [s]."""
@@ -189,7 +183,7 @@ class PlannedMotion(Trajectory):
             self._ticks += 1
         else:
             time = self.time
-            most, ends = self.agility.acceleration, (time, time + LOOK_AHEAD * self._period)
+            most, ends = self.agility.acceleration, (time, time + LOOK_AHEAD * PERIOD)
             states = (np.array(self.law.at(end)) for end in ends)
             curve = [self.path.paced(x, xd, xdd, most) for x, xd, xdd in states]
             step = self._pace.advance(self.speed, curve)
@@ -271,13 +265,13 @@ class PlannedMotion(Trajectory):
     def paced_at(self, rate: float) -> Self:
         """Return a copy that has not started, at another rate [-]."""
         other = self.fork()
-        other.speed, other._pace = rate, TimeScaling(self.agility, self._period, rate)  # noqa: SLF001  one of its own kind
+        other.speed, other._pace = rate, TimeScaling(self.agility, rate)  # noqa: SLF001  one of its own kind
         return other
 
     @property
     def time(self) -> float:
         """Elapsed time at full speed [s]."""
-        return self._since + self._ticks * self._pace.rate * self._period
+        return self._since + self._ticks * self._pace.rate * PERIOD
 
     @property
     def finished(self) -> bool:
@@ -286,13 +280,13 @@ class PlannedMotion(Trajectory):
 
 
 def quickest_motion(
-    path: Path, limits: MotionLimits, period: float, speed: float = 1.0, agility: MotionLimits | None = None
+    path: Path, limits: MotionLimits, speed: float = 1.0, agility: MotionLimits | None = None
 ) -> PlannedMotion:
     """Return the double-S motion along a path from rest to rest within limits of its parameter.
 
     Speed and agility are those of `PlannedMotion`. Raise ValueError if it would last for hours.
     """
-    return PlannedMotion(path, DoubleS(path.start, path.end, limits), period, speed, agility)
+    return PlannedMotion(path, DoubleS(path.start, path.end, limits), speed, agility)
 
 
 def _stands_sooner(paused: PlannedMotion, free: PlannedMotion) -> bool:

@@ -4,6 +4,7 @@ import math
 from collections import deque
 
 from tvist_controller.trajectory.base import MotionLimits
+from tvist_plant.plant import PERIOD
 
 WINDOW = 128  # number of set-points over which lateness is observed, in four parts
 MAX_PERIODS, MAX_SECONDS = 2.0, 0.02
@@ -32,11 +33,10 @@ class PlayOut:
         look_ahead: int,  # periods between the position and the newest set-point it needs [-]
         ticks: float,  # per period of the stream, at least one [-]
         limits: MotionLimits,  # of the stream
-        period: float,  # tick [s]
     ) -> None:
-        self._limits, self._period, self._ticks = limits, period, ticks
+        self._limits, self._ticks = limits, ticks
         self._base = (look_ahead + SPARE_PERIODS * (ticks > 1.0)) * ticks - 1.0
-        self._most = max(MAX_PERIODS * ticks, MAX_SECONDS / period)
+        self._most = max(MAX_PERIODS * ticks, MAX_SECONDS / PERIOD)
         self._origin, self._now = first, 0
         self._parts: deque[tuple[float, float]] = deque(maxlen=4)
         self._part, self._count = (0.0, 0.0), 0
@@ -86,11 +86,11 @@ class PlayOut:
         self._now += 1
         delay = self._lags[2]
         if behind > 0.0:
-            self._held = min(delay + behind / self._period, self._wanted + self._most)
+            self._held = min(delay + behind / PERIOD, self._wanted + self._most)
             self._calm = 0
         else:
             self._calm += 1
-            if self._calm > CALM / self._period and speed < SLOW_SHARE * self._limits.velocity:
+            if self._calm > CALM / PERIOD and speed < SLOW_SHARE * self._limits.velocity:
                 self._held = self._base
         goal = max(self._wanted, self._held)
         if delay == goal and self._rate == 0.0:
@@ -99,9 +99,9 @@ class PlayOut:
         if gap < CLOSE:
             self._lags, self._rate = [goal] * 3, 0.0
             return
-        way = speed * gap * self._period / SHARE
+        way = speed * gap * PERIOD / SHARE
         slow = max(math.sqrt(way / self._limits.acceleration), math.cbrt(way / self._limits.jerk))
-        share = self._period / (self._period + slow)
+        share = PERIOD / (PERIOD + slow)
         ahead = goal
         for number in range(3):
             ahead = self._lags[number] = self._lags[number] + share * (ahead - self._lags[number])

@@ -13,6 +13,7 @@ from tvist_controller.trajectory.guided import Guided, StuckError
 from tvist_controller.trajectory.limiter import TorqueMargin
 from tvist_kernels.compiling import inlined
 from tvist_plant.chain import WIDTH
+from tvist_plant.plant import PERIOD
 
 FOUND, IMPOSSIBLE, SINGULAR = 0, 1, 2
 
@@ -163,18 +164,17 @@ class Speed(Guided):
         state: tuple[Floats, Floats, Floats],  # to continue from, q, q̇ and q̈, each of shape (n,)
         limits: MotionLimits,  # of every joint; the jerk is that of stops
         torque: TorqueMargin,
-        period: float,  # tick [s]
         *,
         rate: float = 1.0,  # of its time, 0 to 1 [-]; more if the joints are too fast for it at the start
         arm: Arm | None = None,  # the arm whose tool has the velocity; None for velocities of the joints
     ) -> None:
         self._q, self._qd, self._qdd = (np.array(values, dtype=float) for values in state)
-        self._torque, self._period = torque, period
+        self._torque = torque
         self.adopt(limits)
         self.arm = arm  # the arm whose tool has the velocity; None for joint velocities
         n, fastest = len(self._q), float(np.abs(self._qd).max())
         # A tool continues from the actual step, even if the joints count as standing.
-        self._step = period * (self._qd - 0.5 * period * self._qdd)
+        self._step = PERIOD * (self._qd - 0.5 * PERIOD * self._qdd)
         if stands := fastest <= STANDING:
             self._qd = np.zeros(n)
         self.rate = max(rate, min(fastest / limits.velocity, 1.0))
@@ -203,7 +203,7 @@ class Speed(Guided):
 
     def adopt(self, limits: MotionLimits) -> None:
         """See `Guided.adopt`; the jerk is that of reversing the acceleration within a tick."""
-        self._arm_limits, self.limits = limits, abrupt(limits, self._period)
+        self._arm_limits, self.limits = limits, abrupt(limits)
 
     def pace(self, speed: float, slowest: float | None) -> None:
         """Set the speed; the present one stays until the next tick."""
@@ -249,7 +249,7 @@ class Speed(Guided):
         if self.finished:
             self._step = self._qd = self._qdd = np.zeros_like(self._q)
             return self._q
-        h, limits = self._period, self._arm_limits
+        h, limits = PERIOD, self._arm_limits
         if self.arm is None:
             self._step = h * self._qd
         else:
@@ -286,14 +286,14 @@ class Speed(Guided):
     @property
     def _lag(self) -> float:
         """Factor from acceleration to step change [s^2]: half a tick squared for joints, a whole one for tools."""
-        return (0.5 if self.arm is None else 1.0) * self._period**2
+        return (0.5 if self.arm is None else 1.0) * PERIOD**2
 
     def _ranges(self) -> Floats:
         """Return least and largest change of each joint's step, and largest step, shape (3, n) [rad].
 
         Acceleration away from zero is limited so that a stop can keep the velocity limit.
         """
-        h, limits, speed = self._period, self._arm_limits, np.abs(self._qd)
+        h, limits, speed = PERIOD, self._arm_limits, np.abs(self._qd)
         most = (1.0 + ROUNDING if self.arm is None else USED) * limits.acceleration
         # A stop ends the present acceleration with the limit's jerk, and the joint gets faster until it has. Two ticks
         # are reserved, since the acceleration of the newest reference is known as the mean of two ticks.
@@ -313,7 +313,7 @@ class Speed(Guided):
         yield 0.0
 
     def _take(self, q: Floats, u: Floats, rate: float, place: Floats) -> None:
-        h, step = self._period, q - self._q
+        h, step = PERIOD, q - self._q
         self._qdd = (step - self._step) / self._lag
         self._qd = step / h + 0.5 * h * self._qdd if self.arm is not None else rate * u
         self._q, self._step, self._u, self.rate, self._place = q, step, u, rate, place
@@ -321,6 +321,6 @@ class Speed(Guided):
             self._u = np.zeros_like(u)
 
 
-def abrupt(limits: MotionLimits, period: float) -> MotionLimits:
+def abrupt(limits: MotionLimits) -> MotionLimits:
     """Return limits with which joints may reverse their acceleration within a tick."""
-    return MotionLimits(limits.velocity, limits.acceleration, 2.0 * limits.acceleration / period)
+    return MotionLimits(limits.velocity, limits.acceleration, 2.0 * limits.acceleration / PERIOD)

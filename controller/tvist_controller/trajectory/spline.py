@@ -127,8 +127,7 @@ class SplineCurve(Path):
 
     def third(self, s: Floats) -> Floats:
         """Return d³q/ds³ at k points, shape (k, n), with possible steps at knots."""
-        third: Floats = self._evaluate(s)[3]
-        return third
+        return np.asarray(self._evaluate(s)[3])
 
     def derivatives(self, s: Floats) -> tuple[Floats, Floats, Floats]:
         """Return q and its first two derivatives at k points, each of shape (k, n)."""
@@ -181,8 +180,7 @@ class SplineCurve(Path):
     def _posture(self, x: Floats) -> Floats:
         assert x.shape == (1,), "a parameter is one number, and compiled code does not check"
         evaluate(self._knots, self._coefficients, x, self._one)
-        q: Floats = self._one[0, 0].copy()
-        return q
+        return np.array(self._one[0, 0])
 
     def _evaluate(self, s: Floats) -> Floats:
         out = np.empty((4, len(s), self._coefficients.shape[2]))

@@ -7,6 +7,7 @@ import numpy as np
 import ruckig
 
 from tvist_controller.trajectory.base import BrakingForecast, Floats, Path, Trajectory
+from tvist_plant.plant import PERIOD
 
 
 class Slowing(Trajectory):
@@ -17,12 +18,11 @@ class Slowing(Trajectory):
         start: Sequence[Sequence[float]],  # positions, velocities and accelerations, n each
         acceleration: float,
         jerk: float,
-        period: float,  # tick [s]
     ) -> None:
         self._slowing = _slowing(start, acceleration, jerk)
         self.acceleration, self.jerk = acceleration, jerk
         """Limits of joint acceleration [rad/s^2] and of the entries' jerk [rad/s^3]."""
-        self._period, self._ticks = period, 0
+        self._ticks = 0
 
     @property
     def duration(self) -> float:
@@ -46,7 +46,7 @@ class Slowing(Trajectory):
     def next(self) -> Floats:
         """Advance by one tick and return the sample."""
         self._ticks += 1
-        return self._sample(self._ticks * self._period)
+        return self._sample(self._ticks * PERIOD)
 
     def _sample(self, time: float) -> Floats:
         return self.at(time)[0]
@@ -54,16 +54,14 @@ class Slowing(Trajectory):
     @property
     def finished(self) -> bool:
         """Whether it has come to rest."""
-        return self._ticks * self._period >= self.duration
+        return self._ticks * PERIOD >= self.duration
 
 
 class JointStop(Slowing):
     """Shortest stop within limits of acceleration and jerk; each joint stops as soon as it can."""
 
-    def __init__(
-        self, q: Floats, qd: Floats, qdd: Floats, *, acceleration: float, jerk: float, period: float
-    ) -> None:
-        super().__init__((q.tolist(), qd.tolist(), qdd.tolist()), acceleration, jerk, period)
+    def __init__(self, q: Floats, qd: Floats, qdd: Floats, *, acceleration: float, jerk: float) -> None:
+        super().__init__((q.tolist(), qd.tolist(), qdd.tolist()), acceleration, jerk)
 
     @property
     def end(self) -> Floats:
@@ -78,7 +76,7 @@ class JointStop(Slowing):
     @property
     def velocity(self) -> Floats:
         """Velocity at the last reference, shape (n,) [rad/s]."""
-        return self.at(self._ticks * self._period)[1]
+        return self.at(self._ticks * PERIOD)[1]
 
 
 class PathStop(Slowing):
@@ -106,9 +104,8 @@ class PathStop(Slowing):
         acceleration: float,  # limit for the joints [rad/s^2]
         braking: float,  # corresponding one for the parameter [rad/s^2]
         jerk: float,  # limit for the parameter [rad/s^3]
-        period: float,  # tick [s]
     ) -> None:
-        before = path.forwards(xdd)
+        before, period = path.forwards(xdd), PERIOD
         most, present = jerk * period, max(path.forwards(step) / period, 0.0)
         # The hardest braking from which the velocity can still reach zero without turning back.
         turning = jerk * (0.5 * period - math.sqrt(0.25 * period**2 + 2.0 * present / jerk))
@@ -119,7 +116,7 @@ class PathStop(Slowing):
         halt = -present / period  # the second difference if the next step is zero
         if abs(halt - before) <= most and halt >= -braking:
             speed = bend = 0.0
-        super().__init__(([0.0], [speed], [bend]), braking, jerk, period)
+        super().__init__(([0.0], [speed], [bend]), braking, jerk)
         self.path, self._origin, self.acceleration = path, x, acceleration
         self.braking = braking  # acceleration limit of the parameter [rad/s^2]
 
@@ -163,21 +160,20 @@ class SlowedStop(Trajectory):
         acceleration: float,  # that the slowing of time may cause at any joint [rad/s^2]
         jerk: float,  # that it may cause [rad/s^3]
         fastest: float,  # largest velocity of any joint now [rad/s]
-        period: float,  # tick [s]
     ) -> None:
         self.path, self.acceleration, self.jerk = path, acceleration, jerk
         slowing = _slowing(([0.0], [1.0], [0.0]), acceleration / fastest, jerk / fastest)
         self.duration = float(slowing.duration)  # duration [s]
-        self._period, self._ticks = period, 0
-        ticks = np.arange(int(np.ceil(self.duration / period)) + 1)
-        times = [float(slowing.at_time(min(tick * period, self.duration))[0][0]) for tick in ticks.tolist()]
-        self._samples = _between(ahead, np.array(times) / period)
+        self._ticks = 0
+        ticks = np.arange(int(np.ceil(self.duration / PERIOD)) + 1)
+        times = [float(slowing.at_time(min(tick * PERIOD, self.duration))[0][0]) for tick in ticks.tolist()]
+        self._samples = _between(ahead, np.array(times) / PERIOD)
         """Samples, beginning with the motion's newest one."""
         joints = np.array([path.posture(x) for x in (ahead[0], *self._samples, self._samples[-1])])
         self._states = (
             joints[1:-1],
-            0.5 * (joints[2:] - joints[:-2]) / period,
-            np.diff(joints, 2, axis=0) / period**2,
+            0.5 * (joints[2:] - joints[:-2]) / PERIOD,
+            np.diff(joints, 2, axis=0) / PERIOD**2,
         )
 
     @property
@@ -198,8 +194,7 @@ class SlowedStop(Trajectory):
     def next(self) -> Floats:
         """Advance by one tick and return the parameter."""
         self._ticks += 1
-        x: Floats = self._samples[min(self._ticks, len(self._samples) - 1)]
-        return x
+        return np.asarray(self._samples[min(self._ticks, len(self._samples) - 1)])
 
     @property
     def finished(self) -> bool:
@@ -211,18 +206,17 @@ class SlowedStop(Trajectory):
         """BrakingForecast of its motion, which brakes from the start."""
         along = self._samples[:, self.path.leading]
         braking, jerk = (
-            float(np.abs(np.diff(along, order)).max(initial=0.0)) / self._period**order for order in (2, 3)
+            float(np.abs(np.diff(along, order)).max(initial=0.0)) / PERIOD**order for order in (2, 3)
         )
         return BrakingForecast(self.path, self._samples[-1], braking, jerk, 0.0)
 
     @property
     def end(self) -> Floats:
         """Final joint positions, shape (n,) [rad]."""
-        end: Floats = self._states[0][-1]
-        return end
+        return np.asarray(self._states[0][-1])
 
     def _number(self, time: float) -> int:
-        return min(round(time / self._period), len(self._samples) - 1)
+        return min(round(time / PERIOD), len(self._samples) - 1)
 
 
 def _between(ahead: Floats, ticks: Floats) -> Floats:
@@ -233,10 +227,8 @@ def _between(ahead: Floats, ticks: Floats) -> Floats:
     before, start, end, then = (ahead[np.minimum(number + step, last)] for step in (-1, 0, 1, 2))
     own, next_ = 0.5 * (end - before), 0.5 * (then - start)
     change = end - start
-    found: Floats = start + t * (
-        own + t * (3.0 * change - 2.0 * own - next_ + t * (own + next_ - 2.0 * change))
-    )
-    return found
+    bent = 3.0 * change - 2.0 * own - next_ + t * (own + next_ - 2.0 * change)
+    return np.asarray(start + t * (own + t * bent))
 
 
 def _slowing(start: Sequence[Sequence[float]], acceleration: float, jerk: float) -> ruckig.Trajectory:

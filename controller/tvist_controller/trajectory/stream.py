@@ -12,6 +12,7 @@ from tvist_controller.trajectory.guided import LimitedFollower
 from tvist_controller.trajectory.limiter import TorqueMargin
 from tvist_controller.trajectory.play_out import PlayOut
 from tvist_controller.trajectory.stop import JointStop
+from tvist_plant.plant import PERIOD
 
 BRIDGED = 2  # largest number of consecutive missing set-points that are extrapolated
 
@@ -35,15 +36,14 @@ class SetpointStream(LimitedFollower):
         q: Floats,  # at which the arm is at rest, shape (n,) [rad]
         stream_period: float,  # time between set-points, at least a tick [s]
         limits: MotionLimits,
-        period: float,  # tick [s]
         *,
         reach: Floats | None = None,  # largest |q| of each joint, shape (n,) [rad]; None for no limit
         torque: TorqueMargin | None = None,  # None for no limit
     ) -> None:
         self._rest, still = np.array(q, dtype=float), np.zeros(len(q))
         reach = np.full(len(q), np.inf) if reach is None else reach
-        super().__init__((self._rest, still, still), limits, reach, torque, period)
-        self._ticks = max(round(stream_period / period, 9), 1.0)
+        super().__init__((self._rest, still, still), limits, reach, torque)
+        self._ticks = max(round(stream_period / PERIOD, 9), 1.0)
         direct = self._ticks == 1.0
         self._curve, self._look_ahead = (linear, 1) if direct else (cubic, 2)
         self._play_out: PlayOut | None = None
@@ -94,12 +94,12 @@ class SetpointStream(LimitedFollower):
     def end(self) -> JointStop:
         """Stop within the stream's limits."""
         limits = self.limits
-        return JointStop(*self.state, acceleration=limits.acceleration, jerk=limits.jerk, period=self._period)
+        return JointStop(*self.state, acceleration=limits.acceleration, jerk=limits.jerk)
 
     @property
     def delay(self) -> float:
         """Time from arrival of the earliest set-points until the curve reaches them [s]."""
-        return 0.0 if self._play_out is None else self._play_out.delay * self._period
+        return 0.0 if self._play_out is None else self._play_out.delay * PERIOD
 
     def _receive(self) -> None:
         play_out, newest = self._play_out, max(self._waiting)
@@ -131,7 +131,7 @@ class SetpointStream(LimitedFollower):
         return self._play_from(newest)
 
     def _play_from(self, sequence: int) -> PlayOut:
-        self._play_out = PlayOut(sequence, self._look_ahead, self._ticks, self.limits, self._period)
+        self._play_out = PlayOut(sequence, self._look_ahead, self._ticks, self.limits)
         return self._play_out
 
     def _evaluate(self, play_out: PlayOut) -> tuple[Floats, Floats]:
@@ -140,7 +140,7 @@ class SetpointStream(LimitedFollower):
         if not self._complete(origin + after + self._look_ahead - 1):
             return self._wait()
         self._pause = None
-        q, qd, self._speed = self._curve(self._points, offset - after + 1.0, play_out.rate / self._period)
+        q, qd, self._speed = self._curve(self._points, offset - after + 1.0, play_out.rate / PERIOD)
         return q, qd
 
     def _complete(self, needed: int) -> bool:

@@ -137,7 +137,7 @@ def cycle_tick() -> Run:
 
     def run() -> float:
         cycle.reset(start)
-        cycle.begin(quickest_motion(JointLine(start, target), LIMITS, PERIOD))
+        cycle.begin(quickest_motion(JointLine(start, target), LIMITS))
         return us_per_tick(go)
 
     return run
@@ -150,7 +150,7 @@ def line_filter(setup: Setup) -> TvistFilter:
 
 def motion() -> list[Floats]:
     """Return the references of a run, each of shape (n,) [rad]."""
-    trajectory = quickest_motion(JointLine(np.array(pose("Q1")), np.array(pose("Q3"))), LIMITS, PERIOD)
+    trajectory = quickest_motion(JointLine(np.array(pose("Q1")), np.array(pose("Q3"))), LIMITS)
     return [trajectory.next() for _ in range(TICKS)]
 
 

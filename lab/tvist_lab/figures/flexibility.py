@@ -84,7 +84,7 @@ class _Arm:
         cycle = ControlCycle(
             description, unshaped, q=start, declared=self.payload, carried=self.payload, seed=0
         )
-        motion = quickest_motion(JointLine(start, self.q), MotionLimits(1.5, 2.0, 100.0), PERIOD)
+        motion = quickest_motion(JointLine(start, self.q), MotionLimits(1.5, 2.0, 100.0))
         cycle.begin(motion)
         stop, after = round(motion.duration / PERIOD), round(WATCHED / PERIOD)
         rows = []

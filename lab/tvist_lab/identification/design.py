@@ -122,7 +122,7 @@ def predicted(arm: ArmModes, q: Floats, payload: int, logarithms: Floats | None 
 def _pushes(rows: Floats, rigid: Floats, jog: Floats) -> Floats:
     """Return the torques of the drives on their motors during and after a jog, shape (ticks, n) [N m]."""
     _, B, K_d, K_p, _ = rows
-    motion = quickest_motion(JointLine(np.zeros_like(jog), jog), LIMITS, PERIOD)
+    motion = quickest_motion(JointLine(np.zeros_like(jog), jog), LIMITS)
     way = []
     while not motion.finished:
         way.append(motion.next())

@@ -107,7 +107,7 @@ class JogPlan:
             moves += [(*ends, self.ways) for ends in pairwise([at, *jog.way])]
             moves.append((jog.way[-1], jog.q, jog.limits))
             at = jog.q
-        lasting = (quickest_motion(JointLine(a, b), limits, PERIOD).duration for a, b, limits in moves)
+        lasting = (quickest_motion(JointLine(a, b), limits).duration for a, b, limits in moves)
         return sum(lasting, rests * (PAUSE + AFTER))
 
 

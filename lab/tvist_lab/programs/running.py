@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from tvist_controller.api.line import Setup
-from tvist_controller.api.robot import Controller, Host, Sink, experience_of, info_of
+from tvist_controller.api.robot import Controller, Host, Sink, info_of, payload_learning_of
 from tvist_lab.programs.watch import ProgramWatch
 from tvist_plant.foreign import check_unpaced
 from tvist_protocol.codec import encode
@@ -70,7 +70,7 @@ def run_in_lockstep(
             start_of_it = controller.setup.to_builtins()
             recorder = Recorder(record, info_of(controller), start_of_it, wait=True, on_error=on_record_error)
             sinks.insert(0, ends.enter_context(recorder))
-        host = Host(controller, *sinks, experience=experience_of(controller.setup))
+        host = Host(controller, *sinks, learning=payload_learning_of(controller.setup))
         try:
             _start(lambda command: host.request(encode(command)), text, inputs)
         except BaseException:

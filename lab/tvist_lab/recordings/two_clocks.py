@@ -15,7 +15,7 @@ from scipy.signal import correlate, find_peaks
 from scipy.spatial.transform import Rotation
 from scipy.stats import t as student
 
-from tvist_controller.api.planning import Arm
+from tvist_controller.api.line import Arm
 from tvist_lab.recordings.recording import Floats, RecordingError
 from tvist_plant.description import RobotDescription
 

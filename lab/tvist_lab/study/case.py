@@ -13,7 +13,6 @@ from tvist_lab.study.line import PAPER, point_to_point
 from tvist_lab.study.method import Method
 from tvist_lab.study.moves import Move, stopped_stream
 from tvist_plant.description import RobotDescription
-from tvist_plant.plant import PERIOD
 from tvist_plant.variants import Variant
 
 LIMITS = {"gentle": PAPER, "industrial": MotionLimits(velocity=3.0, acceleration=8.0, jerk=2000.0)}
@@ -51,7 +50,7 @@ class Case:
         """Largest torque that a rigid arm needs for the move, relative to its drive's limit [-]."""
         description = self.description
         dynamics = InverseDynamics(description, body(paper_payload(description, self.move.mass)))
-        q, qd, qdd = central_differences(self.point_to_point(), PERIOD)
+        q, qd, qdd = central_differences(self.point_to_point())
         torque = dynamics.torques(q, qd, qdd) + np.array(description.drives.rotor_inertia) * qdd
         return float((np.abs(torque).max(axis=0) / np.array(description.limits.torque)).max())
 

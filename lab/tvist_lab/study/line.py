@@ -30,7 +30,7 @@ RESTING = 4  # ticks at rest before the motion
 
 def point_to_point(start: Floats, target: Floats, limits: MotionLimits = PAPER) -> Floats:
     """Return a double S from the first sample that may move to the one at the target, shape (T, n) [rad]."""
-    return samples_of(quickest_motion(JointLine(start, target), limits, PERIOD))
+    return samples_of(quickest_motion(JointLine(start, target), limits))
 
 
 def samples_of(trajectory: Trajectory) -> Floats:
@@ -60,7 +60,7 @@ def lengthened(start: Floats, target: Floats, ticks: int, limits: MotionLimits =
     for _ in range(30):  # the duration increases as the jerk decreases
         middle = 0.5 * (low + high)
         slower = MotionLimits(limits.velocity, limits.acceleration, float(np.exp(middle)))
-        if quickest_motion(JointLine(start, target), slower, PERIOD).duration > ticks * PERIOD:
+        if quickest_motion(JointLine(start, target), slower).duration > ticks * PERIOD:
             low = middle
         else:
             high = middle

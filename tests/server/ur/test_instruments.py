@@ -10,7 +10,7 @@ from tests.controller.robots import UR5E, cut
 from tests.plant.arms import chain
 
 from tvist_controller.instruments.snapshot import Instruments
-from tvist_controller.line.inverse_dynamics import InverseDynamics
+from tvist_controller.kinematics.arm import InverseDynamics
 from tvist_controller.setup import body, paper_payload
 from tvist_plant.model import rigid_model
 from tvist_protocol import commands as c

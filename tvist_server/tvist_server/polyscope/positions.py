@@ -5,7 +5,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from tvist_controller.paths.poses import Placement, placement
+from tvist_controller.kinematics.pose import Placement, placement
 from tvist_server.polyscope.installation import Pose, numbers
 
 

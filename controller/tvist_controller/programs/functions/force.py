@@ -6,21 +6,9 @@ import numpy as np
 
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.motion.force_control import Feature
-from tvist_controller.programs.arguments import (
-    Flag,
-    Target,
-    Vector6,
-    integer,
-    number,
-    numbers,
-    pose,
-    several,
-    shown,
-    whole,
-    within,
-)
+from tvist_controller.programs import arguments as args
+from tvist_controller.programs.blended_moves import Turns
 from tvist_controller.programs.functions.family import Family, Parts, reads
-from tvist_controller.programs.journey import Turns
 from tvist_controller.trajectory import ForceTask
 from tvist_protocol.forces import Push
 from tvist_protocol.io import Length
@@ -34,27 +22,27 @@ NOWHERE: Any = Array((0,) * 3)
 
 def _axes(name: str, value: object) -> Floats:
     return np.array(
-        [integer(f"{name}[{k}]", one, 0, 1) for k, one in enumerate(numbers(name, value, 6))], float
+        [args.integer(f"{name}[{k}]", one, 0, 1) for k, one in enumerate(args.numbers(name, value, 6))], float
     )
 
 
 def _limits(name: str, value: object) -> Floats:
-    found = [number(f"{name}[{k}]", one, 0.0) for k, one in enumerate(numbers(name, value, 6))]
+    found = [args.number(f"{name}[{k}]", one, 0.0) for k, one in enumerate(args.numbers(name, value, 6))]
     return np.minimum(found, MAX_LIMIT)
 
 
 def _feature(name: str, value: object) -> Feature:
     if isinstance(value, Array):
-        return pose(name, value)
+        return args.pose(name, value)
     if value == "base":
         return "base"
     if value == "tool":
         return "tool"
-    raise Fault(f'{name} is {shown(value)}: it must be "base", "tool" or a pose')
+    raise Fault(f'{name} is {args.shown(value)}: it must be "base", "tool" or a pose')
 
 
 Axes = Annotated[Floats, _axes]
-Place = Annotated[tuple[float, ...], several(3, Length)]
+Place = Annotated[tuple[float, ...], args.several(3, Length)]
 
 
 class ForceFunctions(Family):
@@ -69,38 +57,38 @@ class ForceFunctions(Family):
     @costs(120)
     def force_mode(
         self,
-        task_frame: Target,
+        task_frame: args.Target,
         selection_vector: Axes,
-        wrench: Annotated[tuple[float, ...], several(6, Push)],
-        type: Annotated[int, whole(1, 3)],
+        wrench: Annotated[tuple[float, ...], args.several(6, Push)],
+        type: Annotated[int, args.whole(1, 3)],
         limits: Annotated[Floats, _limits],
     ) -> Turns:
         """Comply with forces along the selected axes of a frame, up to a wrench; other axes stay stiff."""
         task = ForceTask(selection_vector, np.array(wrench), limits, self._damping, self._gain)
-        yield from self._arm.give_way(lambda: self._access.force.begin(task, task_frame, type))
+        yield from self._arm.start_compliance(lambda: self._access.force.begin(task, task_frame, type))
 
     @costs(100)
     def end_force_mode(self) -> None:
         """End force mode and hold the position; also ends a motion in the other axes."""
-        self._arm.hold_again(by_hand=False)
+        self._arm.end_compliance(by_hand=False)
 
-    def force_mode_set_damping(self, damping: Annotated[float, within(0.0, 1.0)]) -> None:
+    def force_mode_set_damping(self, damping: Annotated[float, args.within(0.0, 1.0)]) -> None:
         """Set the damping of force mode in free space, from 0 to 1."""
         self._damping = damping
 
-    def force_mode_set_gain_scaling(self, scaling: Annotated[float, within(0.0, 2.0)]) -> None:
+    def force_mode_set_gain_scaling(self, scaling: Annotated[float, args.within(0.0, 2.0)]) -> None:
         """Scale the gain of force mode, from 0 to 2; above 1 it may become unstable."""
         self._gain = scaling
 
     @costs(120)
     def freedrive_mode(self, freeAxes: Axes = ALL, feature: Annotated[Feature, _feature] = "base") -> Turns:
         """Let the arm be moved by hand along and about the free axes of a frame."""
-        yield from self._arm.give_way(lambda: self._access.force.free(freeAxes, feature))
+        yield from self._arm.start_compliance(lambda: self._access.force.free(freeAxes, feature))
 
     @costs(100)
     def end_freedrive_mode(self) -> None:
         """End freedrive and hold the position."""
-        self._arm.hold_again(by_hand=True)
+        self._arm.end_compliance(by_hand=True)
 
     get_freedrive_status = reads(
         "Return 0, or 1 near a singular posture, which hinders moving by hand, or 2 where it prevents it.",
@@ -116,7 +104,7 @@ class ForceFunctions(Family):
 
     def ft_rtde_input_enable(
         self,
-        enable: Flag,
+        enable: args.Flag,
         sensor_mass: Mass = 0,
         sensor_measuring_offset: Place = NOWHERE,
         sensor_cog: Place = NOWHERE,
@@ -132,6 +120,6 @@ class ForceFunctions(Family):
     enable_external_ft_sensor = ft_rtde_input_enable
 
     @costs(250)
-    def tool_contact(self, direction: Vector6 | None = None) -> int:
+    def tool_contact(self, direction: args.Vector6 | None = None) -> int:
         """Return the number of steps since just before a contact in a direction; 0 without contact."""
         return self._access.force.touched((0.0,) * 3 if direction is None else direction[:3])

@@ -1,12 +1,13 @@
 """Functions of Robotiq's URCap for programs that do not contain them in their preamble."""
 
+from collections.abc import Callable
 from math import ceil, floor
-from typing import Annotated
+from typing import Annotated, Any
 
 from tvist_controller.cell.gripper import CLOSED, MOVING, OPEN, Gripper
 from tvist_controller.programs.arguments import number, whole
-from tvist_controller.programs.functions.family import Family
-from tvist_controller.programs.journey import Turns
+from tvist_controller.programs.blended_moves import Turns
+from tvist_controller.programs.functions.family import Family, described
 from tvist_urscript import Fault
 
 _ONE = "1"  # gripper of a call without one; ignored, because the cell has one gripper
@@ -15,6 +16,24 @@ _ONE = "1"  # gripper of a call without one; ignored, because the cell has one g
 Counts = Annotated[int, whole(0, 255)]
 Percent = Annotated[int, lambda name, value: ceil(number(name, value, 0.0, 100.0) / 100.0 * 255.0)]
 """A percentage as counts."""
+
+
+def _reads(what: str, read: Callable[[Gripper], Any]) -> Callable[["GripperFunctions", object], Any]:
+    def get(self: "GripperFunctions", gripper_socket: object = _ONE) -> Any:  # noqa: ARG001  see `_ONE`
+        return read(self._gripper)
+
+    return described(get, what)
+
+
+def _writes(what: str, **values: int) -> Callable[["GripperFunctions", object], None]:
+    def write(self: "GripperFunctions", gripper_socket: object = _ONE) -> None:  # noqa: ARG001  likewise
+        self._write(**values)
+
+    return described(write, what)
+
+
+def _percent(gripper: Gripper) -> int:
+    return floor((gripper.read("POS") or 0) / 255.0 * 100.0)
 
 
 class GripperFunctions(Family):
@@ -37,23 +56,15 @@ class GripperFunctions(Family):
         while self._gripper.read("STA") != 3:
             yield
 
-    def rq_reset(self, gripper_socket: object = _ONE) -> None:
-        """Deactivate the gripper; its fingers stay where they are."""
-        self._write(ACT=0, ATR=0)
-
-    def rq_is_gripper_activated(self, gripper_socket: object = _ONE) -> bool:
-        """Return whether the gripper is active."""
-        return self._gripper.read("STA") == 3
+    rq_reset = _writes("Deactivate the gripper; its fingers stay where they are.", ACT=0, ATR=0)
+    rq_is_gripper_activated = _reads(
+        "Return whether the gripper is active.", lambda one: one.read("STA") == 3
+    )
 
     # ------------------------------------------------------------------ fingers
 
-    def rq_open(self, gripper_socket: object = _ONE) -> None:
-        """Start opening the fingers."""
-        self.rq_move(0, gripper_socket)
-
-    def rq_close(self, gripper_socket: object = _ONE) -> None:
-        """Start closing the fingers."""
-        self.rq_move(255, gripper_socket)
+    rq_open = _writes("Start opening the fingers.", POS=0, GTO=1)
+    rq_close = _writes("Start closing the fingers.", POS=255, GTO=1)
 
     def rq_open_and_wait(self, gripper_socket: object = _ONE) -> Turns:
         """Open the fingers."""
@@ -81,13 +92,8 @@ class GripperFunctions(Family):
         """Move the fingers to a distance in millimetres, or until they meet a part."""
         return self.rq_move_and_wait(self._counts(pos_in_mm), gripper_socket)
 
-    def rq_stop(self, gripper_socket: object = _ONE) -> None:
-        """Stop the fingers."""
-        self._write(GTO=0)
-
-    def rq_go_to(self, gripper_socket: object = _ONE) -> None:
-        """Start moving the fingers to the set position."""
-        self._write(GTO=1)
+    rq_stop = _writes("Stop the fingers.", GTO=0)
+    rq_go_to = _writes("Start moving the fingers to the set position.", GTO=1)
 
     def rq_wait(self, gripper_socket: object = _ONE) -> Turns:
         """Wait until the fingers have stopped."""
@@ -122,25 +128,17 @@ class GripperFunctions(Family):
 
     # ------------------------------------------------------------------ state
 
-    def rq_is_object_detected(self, gripper_socket: object = _ONE) -> bool:
-        """Return whether a part has stopped the fingers."""
-        return self._gripper.read("OBJ") in {1, 2}
-
-    def rq_is_motion_complete(self, gripper_socket: object = _ONE) -> bool:
-        """Return whether the fingers have stopped."""
-        return self._gripper.read("OBJ") != MOVING
-
-    def rq_current_pos(self, gripper_socket: object = _ONE) -> int:
-        """Return the position of the fingers, 0 to 255."""
-        return self._gripper.read("POS") or 0
-
-    def rq_current_pos_norm(self, gripper_socket: object = _ONE) -> int:
-        """Return the position of the fingers, 0 to 100."""
-        return floor(self.rq_current_pos(gripper_socket) / 255.0 * 100.0)
-
-    def rq_current_pos_mm(self, gripper_socket: object = _ONE) -> float:
-        """Return the distance between the fingers in millimetres."""
-        return 1e3 * self._gripper.opening
+    rq_is_object_detected = _reads(
+        "Return whether a part has stopped the fingers.", lambda one: one.read("OBJ") in {1, 2}
+    )
+    rq_is_motion_complete = _reads(
+        "Return whether the fingers have stopped.", lambda one: one.read("OBJ") != MOVING
+    )
+    rq_current_pos = _reads("Return the position of the fingers, 0 to 255.", lambda one: one.read("POS") or 0)
+    rq_current_pos_norm = _reads("Return the position of the fingers, 0 to 100.", _percent)
+    rq_current_pos_mm = _reads(
+        "Return the distance between the fingers in millimetres.", lambda one: 1e3 * one.opening
+    )
 
     # ------------------------------------------------------------------ parts
 

@@ -7,21 +7,11 @@ from typing import Annotated, Final
 import numpy as np
 
 from tvist_controller.line.differentiator import STILL, Floats
+from tvist_controller.programs import arguments as args
 from tvist_controller.programs.access import Access, refusals_as_faults
-from tvist_controller.programs.arguments import (
-    Bit,
-    Joints,
-    Positive,
-    Vector6,
-    above_zero,
-    numbers,
-    pose,
-    shown,
-    within,
-)
 from tvist_controller.programs.arm import ProgramArm
+from tvist_controller.programs.blended_moves import Turns
 from tvist_controller.programs.functions.family import Family, Parts
-from tvist_controller.programs.journey import Turns
 from tvist_controller.programs.kinematics import ProgramKinematics
 from tvist_controller.refusal import SLOWEST, check_joints
 from tvist_controller.trajectory import Speed
@@ -43,19 +33,19 @@ MAX_TOOL: Final = 3.0, 15.0
 
 
 def _share(name: str, value: object) -> float:
-    found: float = above_zero()(name, value)
+    found: float = args.above_zero()(name, value)
     if found > 1.0:
         raise Fault(f"{name} is {found:g}: it must be above 0 and at most 1")
     return found
 
 
 PartOfLargest = Annotated[float, _share]
-ToolRate = Annotated[float, above_zero(1e3)]
+ToolRate = Annotated[float, args.above_zero(1e3)]
 """Speed or acceleration of the tool, possibly limited further by the joints."""
-AngularRate = Annotated[float, above_zero(1e5)]
-Duration = Annotated[float, within(0.0, LONGEST)]
+AngularRate = Annotated[float, args.above_zero(1e5)]
+Duration = Annotated[float, args.within(0.0, LONGEST)]
 """Duration of a move; 0 to use velocity and acceleration [s]."""
-Blend = Annotated[float, within(0.0, 10.0)]
+Blend = Annotated[float, args.within(0.0, 10.0)]
 
 
 class ForceModeMoves:
@@ -125,7 +115,9 @@ class MotionFunctions(Family):
     # ------------------------------------------------------------------ planned moves
 
     @costs(180)
-    def movej(self, q: object, a: Positive = 1.4, v: Positive = 1.05, t: Duration = 0, r: Blend = 0) -> Turns:
+    def movej(
+        self, q: object, a: args.Positive = 1.4, v: args.Positive = 1.05, t: Duration = 0, r: Blend = 0
+    ) -> Turns:
         """Move all joints in phase to joint positions, or to the nearest ones for a pose."""
         posture = self._posture("q", q)
         if v > self._velocity and t == 0.0:
@@ -184,7 +176,7 @@ class MotionFunctions(Family):
         a: ToolRate = 1.2,
         v: ToolRate = 0.25,
         r: Blend = 0,
-        mode: Bit = 0,
+        mode: args.Bit = 0,
     ) -> Turns:
         """Move the tool on an arc through the position of one pose to another pose."""
         return self._follow(
@@ -209,7 +201,7 @@ class MotionFunctions(Family):
         return self.movel(goal, a * MAX_TOOL[1], v * MAX_TOOL[0], 0, r)
 
     def _follow(self, segment: Segment) -> Turns:
-        if self._arm.lost:
+        if self._arm.compliance_lost:
             yield from self._arm.regain()
         moves = self._arm if self._access.guidance.compliant is None else self._led
         yield from moves.follow(segment)
@@ -223,8 +215,8 @@ class MotionFunctions(Family):
         a: object = 0,
         v: object = 0,
         t: Duration = 0.002,
-        lookahead_time: Positive = 0.1,
-        gain: Positive = 300,
+        lookahead_time: args.Positive = 0.1,
+        gain: args.Positive = 300,
     ) -> Turns:
         """Follow joint positions for a time; `a` and `v` have no effect, as on UR robots."""
         posture = np.array(self._posture("q", q))
@@ -248,7 +240,7 @@ class MotionFunctions(Family):
         return self._led.lead(goal, goal.velocity, goal.acceleration, max(r, CLOSE))
 
     @costs(100)
-    def speedj(self, qd: Joints, a: Positive = 1.4, t: Duration | None = None) -> Turns:
+    def speedj(self, qd: args.Joints, a: args.Positive = 1.4, t: Duration | None = None) -> Turns:
         """Approach joint velocities and keep them; return after a time, or when they are reached."""
         most, wanted = self._access.description.limits.velocity, np.array(qd)
         wanted *= min(1.0, *(limit / max(abs(one), 1e-12) for one, limit in zip(wanted, most, strict=True)))
@@ -259,7 +251,7 @@ class MotionFunctions(Family):
 
     @costs(120)
     def speedl(
-        self, xd: Vector6, a: ToolRate = 1.2, t: Duration | None = None, aRot: AngularRate | None = None
+        self, xd: args.Vector6, a: ToolRate = 1.2, t: Duration | None = None, aRot: AngularRate | None = None
     ) -> Turns:
         """Approach a tool velocity in the base frame and keep it; see `speedj`."""
         twist, acceleration, guidance = np.array(xd), _within(a, "acceleration"), self._access.guidance
@@ -269,7 +261,7 @@ class MotionFunctions(Family):
         )
 
     @costs(150)
-    def stopj(self, a: Positive = 2) -> Turns:
+    def stopj(self, a: args.Positive = 2) -> Turns:
         """Stop with a joint deceleration."""
         deceleration = _within(a, "acceleration", self._acceleration)
         return self._arm.halt(lambda: self._access.guidance.stop_joints(deceleration))
@@ -299,18 +291,20 @@ class MotionFunctions(Family):
     def _posture(self, name: str, value: object) -> tuple[float, ...]:
         """Return joint positions within range, from these or from a pose."""
         if isinstance(value, Pose):
-            return self._kinematics.posture(pose(name, value), self._near)
-        q = numbers(name, value, self._access.description.joints)
+            return self._kinematics.posture(args.pose(name, value), self._near)
+        q = args.numbers(name, value, self._access.description.joints)
         with refusals_as_faults():
             check_joints(q, self._access.description, name)
         return q
 
     def _pose(self, name: str, value: object) -> tuple[float, float, float, float, float, float]:
         if isinstance(value, Pose):
-            return pose(name, value)
+            return args.pose(name, value)
         if not isinstance(value, Array):
-            raise Fault(f"{name} is {shown(value)}: it must be a pose or a list of joint positions")
-        return self._kinematics.tool_pose(np.array(numbers(name, value, self._access.description.joints)))
+            raise Fault(f"{name} is {args.shown(value)}: it must be a pose or a list of joint positions")
+        return self._kinematics.tool_pose(
+            np.array(args.numbers(name, value, self._access.description.joints))
+        )
 
     @property
     def _near(self) -> Sequence[float]:

@@ -3,19 +3,7 @@
 from collections.abc import Callable
 from typing import Annotated, Any
 
-from tvist_controller.programs.arguments import (
-    Bit,
-    Flag,
-    Joints,
-    Share,
-    either,
-    integer,
-    numbers,
-    shown,
-    whole,
-    within,
-    word,
-)
+from tvist_controller.programs import arguments as args
 from tvist_controller.programs.functions.family import Family, Parts, described, reads
 from tvist_controller.programs.functions.terminals import BitPlace, Configurable, Standard, Tool
 from tvist_controller.programs.indicators import SHOWS_UNTIL_FAILURE, Group
@@ -26,28 +14,28 @@ _NO_TURNS: Any = Array((0.0,) * 6)
 
 
 def _rate(name: str, value: object) -> int:
-    rate = integer(name, value, RATES[0], RATES[-1])
+    rate = args.integer(name, value, RATES[0], RATES[-1])
     if rate not in RATES:
         raise Fault(f"{name} is {rate}: it must be one of {', '.join(map(str, RATES))}")
     return rate
 
 
 def _run_state(name: str, value: object) -> int:
-    what = integer(name, value, 0, 7)
+    what = args.integer(name, value, 0, 7)
     if what > SHOWS_UNTIL_FAILURE:
         raise Fault(f"{name} is {what}: outputs that show whether the arm has power are not simulated")
     return what
 
 
 def _at_rest(name: str, value: object) -> None:
-    if any(numbers(name, value, 3)):
+    if any(args.numbers(name, value, 3)):
         why = "the simulated arm's base stands, so it must be [0, 0, 0]"
-        raise Fault(f"set_base_acceleration: {name} is {shown(value)}; {why}")
+        raise Fault(f"set_base_acceleration: {name} is {args.shown(value)}; {why}")
 
 
 RunState = Annotated[int, _run_state]
-Action = Annotated[str, word("default", "freedrive")]
-Octet = Annotated[int, whole(0, 7)]
+Action = Annotated[str, args.word("default", "freedrive")]
+Octet = Annotated[int, args.whole(0, 7)]
 
 
 _AS_INPUT = "Check an input's action, as `set_standard_digital_input_action`."
@@ -81,26 +69,26 @@ class SetupFunctions(Family):
 
     # ------------------------------------------------------------------ tool
 
-    def set_tool_analog_input_domain(self, port: Bit, domain: Annotated[bool, either]) -> None:
+    def set_tool_analog_input_domain(self, port: args.Bit, domain: Annotated[bool, args.either]) -> None:
         """Make an analogue input of the tool a current (0) or a voltage (1)."""
         self._arm.then(lambda: self._peripherals.choose_tool_input(port, voltage=domain))
 
-    def set_tool_output_mode(self, mode: Bit) -> None:
+    def set_tool_output_mode(self, mode: args.Bit) -> None:
         """Use the tool's digital outputs as outputs (0) or as a second supply (1)."""
         self._arm.then(lambda: self._peripherals.set_tool(tool_output_mode=mode))
 
-    def set_tool_digital_output_mode(self, n: Bit, mode: Annotated[int, whole(1, 3)]) -> None:
+    def set_tool_digital_output_mode(self, n: args.Bit, mode: Annotated[int, args.whole(1, 3)]) -> None:
         """Make a digital output of the tool sinking (1), sourcing (2), or both (3)."""
         self._arm.then(lambda: self._peripherals.set_tool(**{f"tool_digital_output{n}_mode": mode}))
 
     def set_tool_communication(
         self,
-        enabled: Flag,
+        enabled: args.Flag,
         baud_rate: Annotated[int, _rate],
-        parity: Annotated[int, whole(0, 2)],
-        stop_bits: Annotated[int, whole(1, 2)],
-        rx_idle_chars: Annotated[float, within(1.0, 40.0)],
-        tx_idle_chars: Annotated[float, within(0.0, 40.0)],
+        parity: Annotated[int, args.whole(0, 2)],
+        stop_bits: Annotated[int, args.whole(1, 2)],
+        rx_idle_chars: Annotated[float, args.within(1.0, 40.0)],
+        tx_idle_chars: Annotated[float, args.within(0.0, 40.0)],
     ) -> None:
         """Check settings of the tool's serial line; enabling it warns that nothing is connected."""
         if enabled:
@@ -117,7 +105,7 @@ class SetupFunctions(Family):
         Octet,
     )
     set_configurable_digital_input_action = _input_action(_AS_INPUT, "configurable digital input", Octet)
-    set_tool_digital_input_action = _input_action(_AS_INPUT, "tool digital input", Bit)
+    set_tool_digital_input_action = _input_action(_AS_INPUT, "tool digital input", args.Bit)
     set_gp_boolean_input_action = _input_action(
         "Check an input bit's action, as `set_standard_digital_input_action`.", "input bit", BitPlace
     )
@@ -137,12 +125,12 @@ class SetupFunctions(Family):
     def set_runstate_standard_digital_outputs(self, outputs: object) -> None:
         """Check output numbers; the calls that PolyScope exports after this one define their actions."""
         for output in outputs.items if isinstance(outputs, Array) else (outputs,):
-            integer("outputs", output, 0, 7)
+            args.integer("outputs", output, 0, 7)
 
     set_runstate_configurable_digital_output_to_value = _runstate_output(_AS_OUTPUT, "digital", Configurable)
     set_runstate_tool_digital_output_to_value = _runstate_output(_AS_OUTPUT, "digital", Tool)
     set_runstate_standard_analog_output_to_value = _runstate_output(
-        f"{_AS_OUTPUT[:-1]}; low is 0 V or 4 mA.", "analog", Bit
+        f"{_AS_OUTPUT[:-1]}; low is 0 V or 4 mA.", "analog", args.Bit
     )
     set_runstate_gp_boolean_output_to_value = _runstate_output(
         "Choose what an output bit does, as `set_runstate_standard_digital_output_to_value`.", "bit", BitPlace
@@ -150,7 +138,7 @@ class SetupFunctions(Family):
 
     # ------------------------------------------------------------------ arm and safety
 
-    def set_safety_mode_transition_hardness(self, type: Bit) -> None:
+    def set_safety_mode_transition_hardness(self, type: args.Bit) -> None:
         """Check a setting, 0 (hard) or 1 (soft); stops of the safety system are the same for both."""
 
     def set_base_acceleration(self, a: Annotated[None, _at_rest]) -> None:
@@ -160,15 +148,15 @@ class SetupFunctions(Family):
         "Return zero, the acceleration of the base [m/s^2].", lambda _: Array((0.0, 0.0, 0.0))
     )
 
-    def position_deviation_warning(self, enabled: Flag, threshold: Share = 0.8) -> None:
+    def position_deviation_warning(self, enabled: args.Flag, threshold: args.Share = 0.8) -> None:
         """Check a setting; enabling it causes a warning, because deviations are not reported."""
         if enabled:
             self._warn("position_deviation_warning: this controller does not warn of deviations")
 
-    def reset_revolution_counter(self, qNear: Joints = _NO_TURNS) -> None:
+    def reset_revolution_counter(self, qNear: args.Joints = _NO_TURNS) -> None:
         """Check joint positions; no simulated joint turns endlessly, so there is no counter to reset."""
 
-    def motion_version_set(self, version: Annotated[int, whole(1, 2)]) -> None:
+    def motion_version_set(self, version: Annotated[int, args.whole(1, 2)]) -> None:
         """Store a motion version, 1 or 2, for `motion_version_get`; moves are the same for both."""
         self._motion_version = version
 
@@ -176,7 +164,7 @@ class SetupFunctions(Family):
         """Return the motion version set by a program, 2 if none has been set since the server started."""
         return self._motion_version
 
-    def jerk_gain_scaling_set(self, gain: Annotated[float, within(0.01, 1.0)]) -> None:
+    def jerk_gain_scaling_set(self, gain: Annotated[float, args.within(0.01, 1.0)]) -> None:
         """Check a gain, 0.01 to 1; it has no effect, since profile and shaper determine the jerk."""
 
     def high_holding_torque_enable(self) -> None:

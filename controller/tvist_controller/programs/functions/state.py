@@ -5,11 +5,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tvist_controller.instruments.snapshot import Instruments
-from tvist_controller.instruments.variables import ORDER, READERS
+from tvist_controller.instruments.snapshot import READERS, Instruments
+from tvist_controller.instruments.variables import ORDER
 from tvist_controller.instruments.wrench import unshaped
+from tvist_controller.kinematics.arm import InverseDynamics
 from tvist_controller.line.differentiator import Floats
-from tvist_controller.line.inverse_dynamics import InverseDynamics
 from tvist_controller.programs import arguments
 from tvist_controller.programs.arguments import Joints, Target, Text, a_list, a_pose, integer, numbers
 from tvist_controller.programs.functions.family import Family, Parts, reads

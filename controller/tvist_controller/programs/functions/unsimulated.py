@@ -77,8 +77,7 @@ _CALLS = {
     "error codes of the joints": ("pause_on_error_code(code, argument)",),
     "programs that put the arm elsewhere at once": ("set_pos(q)",),
     "screw driving": ("screw_driving(f, v_limit)",),
-}
-"""Subjects that are not simulated, and their functions as scripts call them."""
+}  # subjects that are not simulated, and their functions as scripts call them
 
 
 def _subjects(

@@ -1,42 +1,47 @@
-"""Estimation of the carried payload from motor torques and angles of a motion.
+"""Learning of the carried payload: records motions, studies them outside the ticks, applies lessons at rest.
 
 For means over 20 ms, the torques of an arm with mass m and its centre at c + d are
-
     τ = Y_l(q, q̇, q̈) 1 + B q̈ + F(q̇) + Y_m m + Y_c m d
-
 Y_l has a column per link, Y_m is that of a kilogram at c, by inverse dynamics at the *measured* angles, so
 that springs and drive gains are not needed. All other uncertain quantities are estimated with m and m d, with
 the prior deviations `UNKNOWN`: they reduce certainty instead of appearing as a mass.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
 from tvist_controller.kinematics.arm import Arm
 from tvist_controller.line.differentiator import Floats
-from tvist_controller.safety.experience import Experience, Later, MotionRecord, Plans, at_once
+from tvist_controller.line.line_mode import LineMode
+from tvist_controller.line.line_tick import Sample
+from tvist_controller.planning.plan import Plan
+from tvist_controller.planning.snapshot import FilterState
 from tvist_controller.setup import Setup
 from tvist_plant.chain import BODY
 from tvist_plant.description import Payload as Body
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
+from tvist_plant.user_file import named
 from tvist_protocol.lessons import PayloadLesson
 from tvist_protocol.values import Payload
 
+LONGEST = 10_000  # longest recorded motion; longer ones are dropped [ticks]
+AFTER = 150  # recording time after the end of a motion, for the ring-down [ticks]
+WAITING = 16  # largest number of waiting studies; further motions teach nothing
 BLOCK = 10  # ticks averaged per block
 MIN_BLOCKS = 20  # smallest number of blocks of a motion
-UNKNOWN = {
-    "friction": 0.2,
-    "friction's width": 1.0,
-    "viscous friction": 0.3,
-    "sensor": 0.03,
-    "standing": 0.3,
-    "link": 0.03,
-    "rotor": 0.2,
+UNKNOWN = {  # prior deviations per joint [-]
+    "friction": 0.2,  # Coulomb friction, relative
+    "friction's width": 1.0,  # effect of half its width
+    "viscous friction": 0.3,  # at 1 rad/s, relative to Coulomb friction
+    "sensor": 0.03,  # gain of the torque sensor
+    "standing": 0.3,  # friction at rest
+    "link": 0.03,  # mass of the link
+    "rotor": 0.2,  # rotor inertia
 }
-"""Prior deviations per joint [-]: Coulomb friction, relative; effect of half its width; viscous friction at 1 rad/s
-relative to Coulomb friction; gain of the torque sensor; friction at rest; mass of the link; rotor inertia."""
 FRICTION = ("friction", "friction's width", "viscous friction", "standing")  # which of these are friction
 NOISE = (0.08, 0.001)  # noise of a mean: fraction of Coulomb friction plus fraction of the torque limit [-]
 STICKING = 0.3  # fraction of Coulomb friction that is noise at speeds too low for a certain sign [-]
@@ -49,6 +54,135 @@ DEAD = 0.25  # smallest change of mass that is reported [kg]
 SURE_DEVIATIONS = 2.0  # number of standard deviations for a certain change [-]
 VAGUE = 0.35  # deviation of the mass above which a motion teaches nothing [kg]
 PUSHED = 3.0  # mean squared residual relative to noise above which something else pushed the arm [-]
+
+
+@dataclass(frozen=True)
+class MotionRecord:
+    """A motion of T ticks with its ring-down."""
+
+    q: Floats  # measured joint angles, shape (T, n) [rad]
+    moments: Floats  # measured motor torques on the joint side, shape (T, n) [N m]
+    stop: int  # number of ticks until the commands came to rest
+    whole: bool  # whether it was a shaped motion from rest to rest, without stop, stream or bypass
+    beliefs: FilterState  # state of filter and payload assumed by the controller
+
+
+@dataclass
+class _Motion:
+    beliefs: FilterState  # assumed at its start
+    samples: list[Sample] = field(default_factory=list)
+    stop: int = 0  # as in `MotionRecord`; 0 while it moves
+    whole: bool = True
+
+    def record(self) -> MotionRecord:
+        """Return the record of the completed motion, which takes longer than a tick."""
+        q = np.array([sample.measured.q for sample in self.samples])
+        moments = np.array([sample.measured.moment for sample in self.samples])
+        return MotionRecord(q, moments, self.stop, self.whole, self.beliefs)
+
+
+Later = Callable[[Callable[[], None]], Callable[[], bool]]
+"""Starts a study outside the ticks; returns a function that tells whether it has ended."""
+Study = Callable[[MotionRecord], PayloadLesson | None]
+"""Returns what a motion teaches, None for nothing; called by one thread at a time. All results are in the
+lessons, so a replay studies nothing."""
+Plans = Callable[[PayloadLesson, FilterState], Plan]  # plans the change that a lesson requires
+
+
+def at_once(work: Callable[[], None]) -> Callable[[], bool]:
+    """Study within the tick, which may take any time with the clocks lockstep and free."""
+    work()
+    return lambda: True
+
+
+class LessonRecord(NamedTuple):
+    """A lesson and what it depends on."""
+
+    beliefs: FilterState  # state assumed by the controller during the motion
+    lesson: PayloadLesson  # what was learnt
+    plan: Plan | None  # plan for the lesson; None if not yet planned
+
+
+class PayloadLearning:
+    """Learning from a robot's motions, recorded one after the other and studied in order."""
+
+    def __init__(
+        self,
+        study: Study,
+        later: Later = at_once,  # runs a study in parallel
+        plan: Plans | None = None,  # plans the changes of a lesson; None to plan in the tick that applies it
+    ) -> None:
+        self._study, self._later, self._plan = study, later, plan
+        self._motion: _Motion | None = None  # the motion that is being recorded
+        self._under_way: list[tuple[Callable[[], bool], list[LessonRecord]]] = []
+        self._raised: list[Exception] = []
+        self._reported = set[str]()
+        self._placements = 0
+
+    def watch(
+        self,
+        sample: Sample,
+        present: Callable[[], FilterState],  # the controller's assumptions about the arm
+        *,
+        held: bool,  # whether the drives hold the arm
+        placements: int,  # number of times that the arm was placed, see `ControlCycle`
+    ) -> None:
+        """Take a tick."""
+        if placements != self._placements or not held:
+            self._placements, self._motion = placements, None
+        ended = self._record(sample, present) if held else None
+        if ended is None or len(self._under_way) >= WAITING:
+            return
+        learnt: list[LessonRecord] = []
+
+        def study() -> None:
+            try:
+                motion = ended.record()
+                lesson = self._study(motion)
+                if lesson is not None:
+                    plan = None if self._plan is None else self._plan(lesson, motion.beliefs)
+                    learnt.append(LessonRecord(motion.beliefs, lesson, plan))
+            except Exception as error:  # noqa: BLE001  the robot goes on without the lesson, and `raised` reports it
+                self._raised.append(error)
+
+        self._under_way.append((self._later(study), learnt))
+
+    def _record(self, sample: Sample, present: Callable[[], FilterState]) -> _Motion | None:
+        """Record a tick with drives on; return the motion it ends, if any; `present` is called at the start."""
+        resting, done, motion = sample.mode.at_rest, None, self._motion
+        if not resting and (motion is None or motion.stop):
+            done, motion = motion, _Motion(present())
+            self._motion = motion
+        if motion is None:
+            return None
+        motion.whole = motion.whole and (resting or sample.mode is LineMode.SHAPED)
+        if len(motion.samples) < LONGEST + AFTER:
+            motion.samples.append(sample)
+        if resting and not motion.stop:
+            motion.stop = len(motion.samples)
+            if motion.stop > LONGEST:  # too long to teach anything: its samples take 20 MB
+                self._motion = None
+        if motion.stop and len(motion.samples) == motion.stop + AFTER:
+            done, self._motion = motion, None
+        return done
+
+    def void(self) -> None:
+        """Drop all studies in progress, because of `forget` or another load."""
+        self._under_way = []
+
+    def lessons(self) -> Iterator[LessonRecord]:
+        """Yield the lessons of finished studies once; call while the arm rests."""
+        while self._under_way and self._under_way[0][0]():
+            yield from self._under_way.pop(0)[1]
+
+    def raised(self) -> Sequence[Exception]:
+        """Return new exceptions of studies, each message only once."""
+        if not self._raised:
+            return ()
+        raised, self._raised = self._raised, []
+        new = [error for error in raised if named(error) not in self._reported]
+        self._reported.update(map(named, new))
+        return new
 
 
 @dataclass(frozen=True)
@@ -101,8 +235,8 @@ class Equations:
         return Estimate(self.at + found[:4] / scale, covariance / np.outer(scale, scale))
 
 
-class PayloadStudent:
-    """Tracks the payload from motion to motion; see `experience.Study`.
+class PayloadEstimator:
+    """Tracks the payload from motion to motion; see `Study`.
 
     A motion is first judged alone. If its mass agrees with the earlier estimate, both are combined as in a
     Kalman filter; otherwise the payload has changed and the earlier estimate is dropped.
@@ -138,10 +272,8 @@ class PayloadStudent:
         now = Estimate(known.x, known.covariance + _independent(known.x, *DRIFT).covariance)
         changed = abs(alone.x[0] - known.x[0]) > SURE_DEVIATIONS * np.hypot(alone.deviation, now.deviation)
         found = alone if changed else equations.solve(now)
-        if (
-            found is None or found.x[0] < -SURE_DEVIATIONS * found.deviation - DEAD
-        ):  # something holds the arm up
-            return None
+        if found is None or found.x[0] < -SURE_DEVIATIONS * found.deviation - DEAD:
+            return None  # something holds the arm up
         self._known = found
         return self._lesson(believed, found)
 
@@ -155,15 +287,11 @@ class PayloadStudent:
         why = f"the arm carries {mass:.2f} kg ± {found.deviation:.2f} kg, not {believed.mass:g} kg"
         if beyond:
             why += f", which is above its rating: {self._rated:g} kg are assumed"
-        payload = Payload(mass=assumed, com=(x, y, z), inertia=self._inertia(assumed, believed))
+        like = believed if believed.mass >= LIGHT else self._own  # its inertia is scaled with the mass
+        xx, xy, xz, yy, yz, zz = (assumed / like.mass * value if like.mass else 0.0 for value in like.inertia)
+        payload = Payload(mass=assumed, com=(x, y, z), inertia=(xx, xy, xz, yy, yz, zz))
         self._believed = payload
         return PayloadLesson(payload=payload, why=why, beyond=beyond)
-
-    def _inertia(self, mass: float, believed: Payload) -> tuple[float, float, float, float, float, float]:
-        """Scale the inertia of the assumed or the robot file's payload with the mass."""
-        like = believed if believed.mass >= LIGHT else self._own
-        xx, xy, xz, yy, yz, zz = (mass / like.mass * value if like.mass else 0.0 for value in like.inertia)
-        return xx, xy, xz, yy, yz, zz
 
     def _equations(self, motion: MotionRecord, at: Floats) -> Equations:
         """Return a motion's equations about a mass [kg] and centre of mass [m], shape (4,)."""
@@ -213,8 +341,10 @@ def _each(values: Floats) -> list[Floats]:
     return [values * (np.arange(values.shape[1]) == joint) for joint in range(values.shape[1])]
 
 
-def experience_of(setup: Setup, later: Later = at_once, plan: Plans | None = None) -> Experience | None:
+def payload_learning_of(
+    setup: Setup, later: Later = at_once, plan: Plans | None = None
+) -> PayloadLearning | None:
     """Return a robot's learning from its motions; None if it learns nothing."""
     if setup.adapt != "payload":
         return None
-    return Experience(PayloadStudent(setup.description).study, later, plan)
+    return PayloadLearning(PayloadEstimator(setup.description).study, later, plan)

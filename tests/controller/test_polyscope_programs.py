@@ -1,11 +1,11 @@
-"""Programs as PolyScope and others write them: the set-up before the program, what is not simulated, run states."""
+"""Programs as PolyScope exports them: set-up, functions that are not simulated, run states."""
 
 from pathlib import Path
 
 import pytest
 
 from tvist_controller.instruments.snapshot import Instruments
-from tvist_controller.programs.checking import check_program
+from tvist_controller.programs.compiling import check_program
 from tvist_controller.programs.functions.unsimulated import SUBJECTS
 from tvist_controller.programs.library import known_signatures
 from tvist_controller.programs.table import page
@@ -48,7 +48,7 @@ def warnings(robot):
     return [event.why for event in robot.events if event.kind == "warning"]
 
 
-def test_a_preamble_is_accepted_and_what_it_sets_shows_in_rtde():
+def test_a_polyscope_preamble_is_accepted_and_its_settings_show_in_rtde():
     robot = run(
         a_robot(),
         *PREAMBLE,
@@ -66,40 +66,18 @@ def test_a_preamble_is_accepted_and_what_it_sets_shows_in_rtde():
 @pytest.mark.parametrize(
     ("call", "why"),
     [
-        ("set_tool_analog_input_domain(2, 0)", "port is 2: it must be from 0 to 1"),
-        ("set_tool_output_mode(2)", "mode is 2: it must be from 0 to 1"),
-        ("set_tool_communication(True, 9601, 0, 1, 1.5, 3.5)", "baud_rate is 9601: it must be one of 9600"),
-        ("set_tool_communication(True, 9600, 0, 1, 0.5, 3.5)", "rx_idle_chars is 0.5: it must be from 1 to 40"),
-        ('set_gp_boolean_input_action(128, "default")', "port is 128: it must be from 0 to 127"),
-        ('set_standard_digital_input_action(0, "stop")', 'action is stop: it must be "default" or "freedrive"'),
-        ("jerk_gain_scaling_set(0)", "gain is 0: it must be from 0.01 to 1"),
-        ("set_base_acceleration([0.1, 0, 0])", "the simulated arm's base stands"),
-        ("set_runstate_tool_digital_output_to_value(2, 1)", "outputId is 2: it must be from 0 to 1"),
-        ("set_runstate_standard_digital_output_to_value(0, 6)", "whether the arm has power are not simulated"),
-        ("time(2)", "mode is 2; this controller has no clock of the day"),
-        ('modbus_add_signal("1.2.3.4", 255, 0, 0, "x", True)', "does not simulate Modbus"),
-        ("x = struct(a=1)\n  x.go(1)", "go: this controller does not simulate remote procedure calls and Ethernet/IP"),
-    ],
-)  # fmt: skip
-def test_what_does_not_fit_ends_the_program_with_name_value_and_limit(call, why):
-    assert why in failure(run(a_robot(), call)).why
-
-
-@pytest.mark.parametrize(
-    ("call", "why"),
-    [
         ("set_tool_communication(True, 115200, 0, 1, 1.5, 3.5)", "no tool is connected"),
         ('set_tool_digital_input_action(1, "freedrive")', "tool digital input 1 has the action freedrive"),
         ("position_deviation_warning(True)", "does not warn of deviations"),
     ],
 )
-def test_what_asks_for_something_that_is_not_there_is_said(call, why):
+def test_settings_without_effect_cause_a_warning(call, why):
     robot = run(a_robot(), call)
     assert failure(robot) is None
     assert [why in one for one in warnings(robot)] == [True]
 
 
-def test_time_is_the_robots_and_random_the_same_in_each_run():
+def test_time_is_robot_time_and_random_is_reproducible():
     apart = "textmsg(b.sec - a.sec + (b.nanosec - a.nanosec) / 1000000000)"
     robot = run(a_robot(), "a = time()", "sleep(1.5)", "b = time()", apart, "textmsg([random(), random()])")
     apart, first, second = said(run(robot, "textmsg([random(), random()])"))
@@ -109,7 +87,7 @@ def test_time_is_the_robots_and_random_the_same_in_each_run():
     assert one != other
 
 
-def test_variables_of_rtde_are_those_that_clients_get():
+def test_get_rtde_value_returns_the_values_of_clients():
     keys = (
         "target_q",
         "runtime_state",
@@ -144,7 +122,7 @@ CHOICES = [
 ]
 
 
-def test_outputs_show_whether_the_program_runs_is_paused_or_has_ended():
+def test_runstate_outputs_show_running_paused_and_stopped_programs():
     robot = a_robot()
     assert start(robot, *CHOICES, "sleep(1)") == Done()
     robot.tick(3)
@@ -162,11 +140,11 @@ def test_outputs_show_whether_the_program_runs_is_paused_or_has_ended():
 
 
 @pytest.mark.parametrize("how", ["x = [][0]", "protective_stop()"])
-def test_an_error_or_a_stop_shows_at_the_outputs_that_tell_of_it(how):
+def test_runstate_outputs_show_an_error_or_stop(how):
     assert outputs(run(a_robot(), *CHOICES, "sleep(0.01)", how)) == [False, True, False, False, False]
 
 
-def test_powerdown_ends_the_program_and_the_power():
+def test_powerdown_ends_the_program_and_cuts_power():
     robot = run(a_robot(), "powerdown()", "textmsg(1)")
     robot.tick(5)
     assert (said(robot), playing(robot)) == ([], False)
@@ -177,7 +155,7 @@ def found(*lines):
     return [(one.line, one.column, one.level) for one in check_program(script(*lines))]
 
 
-def test_functions_that_are_not_simulated_are_warnings_beside_the_errors():
+def test_unsimulated_functions_are_warnings_beside_errors():
     assert found("path_offset_enable()", "sleep(1)", "nope()", "end_freedrive_mode()", "path_offset_enable()") == [
         (2, 3, "warning"), (4, 3, "error"), (6, 3, "warning"),
     ]  # fmt: skip
@@ -199,7 +177,7 @@ THREAD = ("thread job():", "x = {}", "sync()", "end", "t = run job()")
         ("hold = 1", "1\nhold = 2\nx = hold", False),
     ],
 )
-def test_a_variable_that_a_robot_does_not_find_in_a_thread_is_a_warning(before, value, warned):
+def test_a_local_variable_used_in_a_thread_is_a_warning(before, value, warned):
     text = script(*before.split("\n"), *(line.format(value) for line in THREAD))
     warnings = [one for one in check_program(text) if "in the thread job" in one.text]
     assert [one.level for one in warnings] == ["warning"] * warned
@@ -217,12 +195,12 @@ def test_a_variable_that_a_robot_does_not_find_in_a_thread_is_a_warning(before, 
         ("def p():\r\n  sync()\r\nend\r\n", []),
     ],
 )
-def test_an_end_in_column_one_before_that_of_the_program_is_a_warning(text, lines):
+def test_an_early_end_in_column_one_is_a_warning(text, lines):
     warnings = [one for one in check_program(text) if "in column 1" in one.text]
     assert [(one.line, one.column, one.level) for one in warnings] == [(line, 1, "warning") for line in lines]
 
 
-def test_every_function_that_is_not_simulated_is_warned_of():
+def test_every_unsimulated_function_causes_a_warning():
     for name in SUBJECTS.keys() - {METHOD}:
         needed = [one.name for one in known_signatures()[name].parameters][
             : known_signatures()[name].required
@@ -232,6 +210,6 @@ def test_every_function_that_is_not_simulated_is_warned_of():
         assert finding.text.startswith(f"{name}: ")
 
 
-def test_the_page_of_the_functions_is_up_to_date():
+def test_the_page_of_functions_is_up_to_date():
     reference = Path(__file__).parents[2] / "docs" / "reference" / "generated" / "urscript-functions.md"
     assert reference.read_text(encoding="utf-8") == page()

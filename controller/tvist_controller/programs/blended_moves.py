@@ -21,7 +21,7 @@ Effect = Callable[[], None]
 DELAY, DELAY_PER_PART = 10, 4
 """Ticks from the call of a line or path to its start, plus ticks per further part: time for planning. They do
 not depend on the planning time, so equal programs move alike."""
-FURTHER, FURTHER_PER_PART = 12, 1
+EXTENSION_DELAY, EXTENSION_DELAY_PER_MOVE = 12, 1
 """Ticks from ordering an extension of the running motion until it applies, plus ticks per move."""
 MAX_PARTS = 50
 """Largest number of moves planned together from rest, and waiting; with more, the program waits."""
@@ -58,7 +58,7 @@ class RateLimit:
         return self._motion.activity is Activity.REST and self.debt > 2 * PAUSE
 
 
-class Journey:
+class BlendedMoves:
     """The blended moves of one thread, and the motion along them.
 
     The motion starts when the last move is known, or as many as are planned together; `step` continues it
@@ -84,9 +84,9 @@ class Journey:
         self._steps: Turns | None = None
         self._marks: list[tuple[int, float]] = []
         """Where the blend at the end of each present move begins, see `PlannedMove.marks`."""
-        self._further: tuple[Callable[[], Plan], int, int] | None = None
+        self._extension: tuple[Callable[[], Plan], int, int] | None = None
         """Ordered plan of an extension, tick at which it applies, and number of moves."""
-        self._ends = self._refuses = False
+        self._final = self._refuses = False
         """Whether the running motion cannot be extended, and whether because a further move is impossible."""
         self._count = 0  # number of moves of the running motion
 
@@ -128,7 +128,7 @@ class Journey:
         if self.over:
             return
         if self._steps is None:
-            self._steps = self._travel()
+            self._steps = self._carry_out()
         try:
             next(self._steps)
         except StopIteration:
@@ -136,7 +136,7 @@ class Journey:
         except Exception as fault:  # noqa: BLE001  the thread that it concerns raises it again
             self.over, self.fault = True, fault
 
-    def _travel(self) -> Turns:
+    def _carry_out(self) -> Turns:
         while self.legs:
             self.skipped = False
             yield from self._rest()
@@ -155,15 +155,15 @@ class Journey:
                 yield
                 move = self._motion.motions.move
                 self._pass_blends(None if move is None else move.progress)
-                self._go_on()
+                self._extend()
             self._pass_blends(self._stops_at)
             self._marks, ended = [], len(self._marks)
             if self.outcome == "motion_done":
-                self._tell_stop(ended)
+                self._warn_of_stop(ended)
                 self._pass(len(self.legs) if self.skipped else ended)
         self._pass(len(self.legs))
 
-    def _tell_stop(self, ended: int) -> None:
+    def _warn_of_stop(self, ended: int) -> None:
         """Warn that the arm stopped at a blend because the next move came too late."""
         comes = len(self.legs) > ended or not self.closed
         if comes and self.legs[ended - 1].blend > 0.0 and not (self._refuses or self.skipped):
@@ -182,7 +182,7 @@ class Journey:
         assert isinstance(reply, Accepted)
         assert isinstance(plan.found, PlannedMove)
         self.number, self.outcome, self._stops_at = reply.id, None, None
-        self._further, self._ends, self._refuses = None, False, False
+        self._extension, self._final, self._refuses = None, False, False
         self._marks = list(plan.found.marks) or [(0, float("inf"))]
         self._count = len(legs)
 
@@ -193,9 +193,7 @@ class Journey:
             self._rate_limit.charge()
             return plans.now(command, within_tick=True)
         while True:
-            while (
-                self._rate_limit.planning > 0
-            ):  # of a thread that was killed meanwhile; plan only one at a time
+            while self._rate_limit.planning > 0:  # one at a time, also of killed threads
                 yield
             self._rate_limit.planning = DELAY + DELAY_PER_PART * (len(legs) - 1)
             ordered = plans.later(command)
@@ -207,30 +205,30 @@ class Journey:
             if plans.hold(plan):
                 return plan
 
-    def _go_on(self) -> None:
+    def _extend(self) -> None:
         """Extend the running motion to moves that have come meanwhile."""
-        if self._further is not None and not self._take():
+        if self._extension is not None and not self._apply_extension():
             return
         under_way = len(self._marks)
         legs = self.legs[under_way : under_way + MAX_FURTHER]
-        if not legs or under_way >= AHEAD or self._ends or self.legs[under_way - 1].blend == 0.0:
+        if not legs or under_way >= AHEAD or self._final or self.legs[under_way - 1].blend == 0.0:
             return
-        ticks = FURTHER + FURTHER_PER_PART * len(legs)
+        ticks = EXTENSION_DELAY + EXTENSION_DELAY_PER_MOVE * len(legs)
         ordered = self._access.plans.further(command_of(legs, goes_on=True), (ticks + SPARE_TICKS) * PERIOD)
         if ordered is not None:
-            self._further = ordered, self._access.latest().tick + ticks, len(legs)
+            self._extension = ordered, self._access.latest().tick + ticks, len(legs)
 
-    def _take(self) -> bool:
+    def _apply_extension(self) -> bool:
         """Apply the plan of an extension when due; return whether another may be ordered."""
-        assert self._further is not None
-        ordered, due, count = self._further
+        assert self._extension is not None
+        ordered, due, count = self._extension
         if self._access.latest().tick < due:
             return False
-        plan, self._further = ordered(), None
+        plan, self._extension = ordered(), None
         if not self._access.plans.hold(plan):  # outdated
             return True
         if not isinstance(plan.found, PlannedMove):  # plan the moves again from the end of the motion
-            self._ends, self._refuses = True, plan.found is not None
+            self._final, self._refuses = True, plan.found is not None
             return False
         part = self._marks[-1][0]
         self._motion.motions.extend(plan.found)

@@ -1,18 +1,44 @@
-"""Monitors of a tick's signals: drives beyond their limits, and failing shapers."""
+"""Monitors of a tick's signals: the interface, overloaded drives, and failing shapers."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.line_mode import LineMode
-from tvist_controller.line.sample import Sample
-from tvist_controller.motion.monitor import Monitor, MonitorFinding
+from tvist_controller.line.line_tick import Sample
 from tvist_plant.plant import PERIOD
+from tvist_protocol.replies import Code
 
 ALLOWED = 0.01  # permitted duration of an overload [s]
 TICKS = round(ALLOWED / PERIOD)
+
+
+class MonitorFinding(NamedTuple):
+    """A monitor's finding and its consequence."""
+
+    why: str  # reason for users
+    code: Code | None = None  # reason for programs
+    then: Literal["warning", "interruption", "protective_stop"] = "warning"
+    """Warn, end the present motion or stream, or make a protective stop."""
+
+
+class Monitor(ABC):
+    """Checks the signals of each tick afterwards; `SafetyControl` has a robot's list of monitors."""
+
+    needs: ClassVar[Literal["nothing", "drives", "drives alone"]] = "nothing"
+    """Run every tick, only while the drives hold the arm, or only if also no motion is compliant."""
+
+    awake = True  # false to skip ticks without a measured force
+
+    @abstractmethod
+    def look(self, sample: Sample) -> MonitorFinding | None:
+        """Return a finding about the latest tick, else None."""
+
+    def restart(self) -> None:  # noqa: B027  most have no memory
+        """Forget earlier ticks: the arm was placed elsewhere, or the drives have started to hold it."""
 
 
 class TorqueOverload(Monitor):
