@@ -20,11 +20,11 @@ from tvist_controller.controller import Controller
 from tvist_controller.dispatch.planner import Planner
 from tvist_controller.host import Host
 from tvist_controller.setup import Setup
-from tvist_server.assembly import LOCAL, Share, check_together, protected, shares
+from tvist_server.assembly import LOCAL, Share, check_together, security_of, shares
 from tvist_server.config import ServeConfig
 from tvist_server.gateways.access import with_robots_behind
 from tvist_server.gateways.base import Prepare
-from tvist_server.gateways.exposure import protocol
+from tvist_server.gateways.security import protocol
 from tvist_server.kernels import warm_up
 from tvist_server.option_values import StartError
 from tvist_server.own_folder import OwnFolder
@@ -33,14 +33,14 @@ from tvist_server.shutdown import Shutdown
 from tvist_server.ur_ports import InterfaceName
 from tvist_server.worker import (
     END,
-    Made,
     News,
     ParentPipe,
     WorkerEnded,
+    WorkerMade,
     WorkerReady,
     WorkerRefused,
-    meet_clients,
-    work,
+    serve_robots,
+    serve_router,
 )
 
 
@@ -66,7 +66,7 @@ class Workers:
         self.setups = config.setups()
         check_together(config, len(self.setups))
         self._names = [setup.name for setup in self.setups]
-        self._listen, self._guard = protected(config, self._names)
+        self._listen, self._guard = security_of(config, self._names)
         self._config = config
         self.ur: list[tuple[str, dict[InterfaceName, int]]] = []
         """Address and ports of each robot's UR interfaces; empty if they are closed."""
@@ -95,7 +95,7 @@ class Workers:
     def run(self, ready: Callable[[], None], ending: Shutdown) -> None:
         """Serve until a signal comes; WorkersError if a process or robot stops, after the others have ended."""
         heard, wake = multiprocessing.Pipe(duplex=False)
-        ending.hear(lambda: wake.send(None))
+        ending.on_request(lambda: wake.send(None))
         why: str | None = None
         try:
             for worker in self._workers:
@@ -144,19 +144,10 @@ class Workers:
         gc.collect()
         gc.freeze()  # keeps memory shared: the collector writes to every object that it visits
         parts = shares(len(self.setups), self._config.workers)
-        pipes = [multiprocessing.Pipe() for _ in parts]
         router = None if self._config.connect else self._inside
         for number, part in enumerate(parts):
-            # A process that keeps another one's pipe open would hide the end of the first process from it.
-            rest = [
-                end for other, pair in enumerate(pipes) for end in pair if (other, end) != (number, pair[1])
-            ]
-            rest += [front.pipe for front in self._front]
             who = f"worker {number + 1} of {len(parts)} ({_listed(self._names, part)})"
-            do = partial(work, self._config, Share(part, router))
-            self._workers.append(self._started(who, do, *pipes[number], rest))
-        for _, theirs in pipes:
-            theirs.close()
+            self._workers.append(self._start(who, partial(serve_robots, self._config, Share(part, router))))
         gc.unfreeze()
 
     def _open(self) -> _Worker:
@@ -165,33 +156,26 @@ class Workers:
             listen, place = [*listen, self._inside], config.namespace or ""
             access = with_robots_behind(guard["access_control"], self._names, place, protocol(self._inside))
             guard = {**guard, "access_control": access}
-        ours, theirs = multiprocessing.Pipe()
-        do = partial(meet_clients, config, self._names, listen, guard)
-        front = self._started("the process that clients connect to", do, ours, theirs, [ours])
-        theirs.close()
-        return front
+        do = partial(serve_router, config, self._names, listen, guard)
+        return self._start("the process that clients connect to", do)
 
-    def _started(
-        self,
-        who: str,
-        do: Callable[[ParentPipe], None],
-        ours: Connection,
-        theirs: Connection,
-        rest: Sequence[Connection],
-    ) -> _Worker:
-        process = multiprocessing.get_context("fork").Process(
-            target=_begin, args=(do, theirs, rest, self._folder)
-        )
+    def _start(self, who: str, do: Callable[[ParentPipe], None]) -> _Worker:
+        ours, theirs = multiprocessing.Pipe()
+        # A process that keeps another one's pipe open would hide the end of the first process from it.
+        rest = [ours, *(worker.pipe for worker in self._front + self._workers)]
+        context = multiprocessing.get_context("fork")
+        process = context.Process(target=_begin, args=(do, theirs, rest, self._folder))
         process.start()
+        theirs.close()
         return _Worker(who, process, ours)
 
     def _tell_front(self, word: object) -> None:
         with contextlib.suppress(OSError):  # it has died, which `run` reports
             self._front[0].pipe.send(word)
 
-    def _made(self, worker: _Worker) -> Made:
+    def _made(self, worker: _Worker) -> WorkerMade:
         news = self._news(worker)
-        if isinstance(news, Made):
+        if isinstance(news, WorkerMade):
             return news
         if isinstance(news, WorkerRefused) and news.misuse:
             raise StartError(news.why)

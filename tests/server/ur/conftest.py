@@ -51,9 +51,9 @@ class FakeControl:
         self.commands.append(command)
         later = Deferred()
         if isinstance(command, ProgramLoad) and command.name == "nothing.urp":
-            later.come(Refused(code="out_of_range", where="name", why="there is no nothing.urp"))
+            later.set(Refused(code="out_of_range", where="name", why="there is no nothing.urp"))
         elif self._waiting is None:
-            later.come(self.reply)
+            later.set(self.reply)
         else:
             self._waiting.append(later)
         return later
@@ -61,7 +61,7 @@ class FakeControl:
     def asked(self, reply):
         """A reply that comes at once."""
         later = Deferred()
-        later.come(reply)
+        later.set(reply)
         return later
 
     def refuse(self, code="no_control", why="another client has control: 'a'", where="", limit=None):
@@ -74,12 +74,12 @@ class FakeControl:
         """Give every answer that is due; to one that asks again in it, too, unless further ones are kept back."""
         waiting, self._waiting = self._waiting or [], [] if keep else None
         for later in waiting:
-            later.come(reply or self.reply)
+            later.set(reply or self.reply)
 
     def lasting(self):
         return self
 
-    def hear(self, answer):
+    def deliver(self, answer):
         answer()
 
     def leave(self):

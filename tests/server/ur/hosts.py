@@ -4,6 +4,7 @@ from tvist_server.gateways.ur.deferred import begin
 from tvist_server.gateways.ur.external_control import ExternalControl
 from tvist_server.gateways.ur.programs import Programs
 from tvist_server.gateways.ur.robot import NO_MODE
+from tvist_server.program_folder import ProgramFolder
 
 from .decoders import message
 
@@ -18,7 +19,7 @@ async def here(read):
 
 
 def external(folder=None, fetch=nobody):
-    return ExternalControl(folder, fetch, here)
+    return ExternalControl(folder or ProgramFolder(), fetch, here)
 
 
 def hear(request, answers):

@@ -1,4 +1,4 @@
-"""UR's interpreter mode: statements for a running program, and the lines that answer them."""
+"""UR's interpreter mode: statements for a running program, and their answers."""
 
 import asyncio
 from types import SimpleNamespace
@@ -48,7 +48,7 @@ def test_a_statement_is_passed_on_and_acknowledged_with_its_number(client, contr
     assert [command.text for command in control.commands] == ["movej([0,0,0,0,0,0])", "a = 1 b = 2"]
 
 
-def test_a_line_that_is_too_long_is_discarded_and_not_passed_on(client, control):
+def test_an_overlong_statement_is_discarded(client, control):
     control.reply = Accepted(id=10)
     assert client.say("x" * (LONGEST + 1)) == []
     heard = client.say("x = 2\ny = 2\n")
@@ -68,13 +68,13 @@ REFUSED = [
 ]  # fmt: skip
 
 
-def test_a_statement_that_is_refused_is_discarded_with_the_reason(client, control):
+def test_a_refused_statement_is_discarded_with_the_reason(client, control):
     for code, why, where, said in REFUSED:
         control.refuse(code, why=why, where=where)
         assert client.say("f()\n") == [f"discard: {said}: f()"]
 
 
-def test_questions_are_answered_from_what_the_robot_tells_and_what_was_answered_since(client, control, robot):
+def test_state_questions_count_statements_since_the_last_io(client, control, robot):
     asked = ("statelastinterpreted", "statelastexecuted", "statelastcleared", "stateunexecuted")
     numbers = [client.say(question + "\n") for question in asked]
     assert numbers == [[f"state: {n}: {question}"] for n, question in zip((9, 7, 4, 2), asked, strict=True)]
@@ -92,12 +92,12 @@ def test_questions_are_answered_from_what_the_robot_tells_and_what_was_answered_
     assert client.say("stateunexecuted\n") == ["state: 0: stateunexecuted"]
 
 
-def test_commands_skip_what_waits_or_what_moves(client, control):
+def test_skipbuffer_and_abort_skip_statements_or_the_move(client, control):
     assert client.say("skipbuffer\nabort\n") == ["ack: 9: skipbuffer", "ack: 9: abort"]
     assert control.commands == [ProgramSkip(token="the-token", what=what) for what in ("statements", "move")]
 
 
-def test_statements_are_passed_on_one_after_the_other(client, control):
+def test_statements_are_sent_one_after_the_other(client, control):
     control.wait()
     assert client.say("a = 1\nb = 2\nc = 3\n") == []
     assert client.session.waiting == 3
@@ -114,7 +114,7 @@ def test_statements_are_passed_on_one_after_the_other(client, control):
 
 @examples(40)
 @given(data=st.binary(max_size=300), cut=st.integers(0, 300))
-def test_no_bytes_break_it(data, cut):
+def test_random_bytes_do_not_break_a_session(data, cut):
     client = Client(SimpleNamespace(programs=Programs(None, external())), FakeControl())
     client.session.receive(data[:cut])
     client.session.receive(data[cut:])
@@ -123,7 +123,7 @@ def test_no_bytes_break_it(data, cut):
     assert all(line.decode().isprintable() for line in b"".join(client.sent).split(b"\n"))
 
 
-async def test_a_program_is_built_statement_by_statement_and_its_error_is_told_with_the_number_of_one(desk):
+async def test_statements_run_one_by_one_and_errors_have_their_number(desk):
     listener, script = await connect(desk, "primary")
     script.write(b"def main():\n  a = 5\n  interpreter_mode()\nend\n")
     await until(lambda: desk.controller.programs.state == "PLAYING")

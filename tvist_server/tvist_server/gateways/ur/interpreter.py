@@ -1,14 +1,14 @@
 """UR's interpreter mode, port 30020: statements for a waiting program, each answered with one line."""
 
+from dataclasses import dataclass, field
+from functools import partial
 from typing import Final, Literal
 
 from msgspec.structs import replace
 
 from tvist_protocol.programs import MAX_SCRIPT, Interpreter, ProgramInterpret, ProgramSkip
 from tvist_protocol.replies import Accepted, Refused
-from tvist_server.gateways.ur.base import InTurnSession, LineSplitter, Send
-from tvist_server.gateways.ur.lease import ConnectionControl
-from tvist_server.gateways.ur.robot import UrRobot
+from tvist_server.gateways.ur.base import InTurnSession, LineSplitter
 
 STATES: Final = {
     "statelastexecuted": "executed",
@@ -32,6 +32,7 @@ NO_PROGRAM, TOO_MANY, SYNTAX, COMPILATION, TOO_LONG = (
 """Reasons of a `discard`, by which clients recognize it; all but the last are UR's."""
 
 
+@dataclass(eq=False)
 class InterpreterSession(InTurnSession[tuple[str, bool]]):
     """One client of the interpreter mode; a blank line is ignored.
 
@@ -39,9 +40,7 @@ class InterpreterSession(InTurnSession[tuple[str, bool]]):
     `state: NUMBER: question`.
     """
 
-    def __init__(self, robot: UrRobot, control: ConnectionControl, send: Send) -> None:
-        super().__init__(robot, control, send)
-        self._lines = LineSplitter(LONGEST + 1)
+    _lines: LineSplitter = field(default_factory=partial(LineSplitter, LONGEST + 1), init=False)
 
     def receive(self, data: bytes) -> None:
         for line in self._lines.feed(data):

@@ -33,31 +33,22 @@ NAMED: dict[str, tuple[WireType, str]] = {
     "speed_slider_fraction": (WireType.DOUBLE, "Position of the speed slider, 0 to 1."),
     "standard_digital_output_mask": (WireType.UINT8, "Mask of the eight standard digital outputs to set."),
     "standard_digital_output": (WireType.UINT8, "Values of the standard digital outputs."),
-    "configurable_digital_output_mask": (
-        WireType.UINT8,
-        "Mask of the eight configurable digital outputs to set.",
-    ),
+    "configurable_digital_output_mask":
+        (WireType.UINT8, "Mask of the eight configurable digital outputs to set."),
     "configurable_digital_output": (WireType.UINT8, "Values of the configurable digital outputs."),
     "tool_digital_output_mask": (WireType.UINT8, "Mask of the tool's two digital outputs to set."),
     "tool_digital_output": (WireType.UINT8, "Values of the tool's digital outputs."),
     "standard_analog_output_mask": (WireType.UINT8, "Mask of the two analogue outputs to set."),
-    "standard_analog_output_type": (
-        WireType.UINT8,
-        "Type of each analogue output: 0 is current (4–20 mA), 1 voltage (0–10 V).",
-    ),
-    "standard_analog_output_0": (
-        WireType.DOUBLE,
-        "Value of analogue output 0 as a share of its range, 0 to 1.",
-    ),
-    "standard_analog_output_1": (
-        WireType.DOUBLE,
-        "Value of analogue output 1 as a share of its range, 0 to 1.",
-    ),
-    "external_force_torque": (
-        WireType.VECTOR6D,
-        "Wrench measured by an external force sensor, every 100 ms; for programs of its host that use it [N, N m].",
-    ),
-}
+    "standard_analog_output_type":
+        (WireType.UINT8, "Type of each analogue output: 0 is current (4–20 mA), 1 voltage (0–10 V)."),
+    "standard_analog_output_0":
+        (WireType.DOUBLE, "Value of analogue output 0 as a share of its range, 0 to 1."),
+    "standard_analog_output_1":
+        (WireType.DOUBLE, "Value of analogue output 1 as a share of its range, 0 to 1."),
+    "external_force_torque":
+        (WireType.VECTOR6D,
+         "Wrench measured by an external force sensor, every 100 ms; for programs of its host that use it [N, N m]."),
+}  # fmt: skip
 """Type and description of each input variable that is not a register."""
 
 _BITS, _INTS, _DOUBLES = get_args(Bank)[:3]
