@@ -430,7 +430,7 @@ def test_invalid_rows_are_reported_and_set_points_stay_within_limits(monkeypatch
     far = Far(monkeypatch)
     plant = called(MovedRobot(FAR, UR5E, Payload(mass=5.0), speed_cap=0.5), 6)
     robot = Robot(plant=plant)
-    for tick in range(700 if "1 s" in said or "left out" in said else 200):
+    for tick in range(660 if "1 s" in said or "left out" in said else 160):
         if tick == 60:
             robot.send(c.MoveJ, q=tuple(Q + 0.2), velocity=0.4)
         elif tick == 120:

@@ -14,6 +14,7 @@ from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import ReplayError, replay_file
 from tvist_plant.plant import Shape
 from tvist_plant.world.mujoco_arm import MujocoArm
+from tvist_plant.world.scene import build
 from tvist_plant.world.scene_file import find_scene
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Accepted
@@ -46,6 +47,12 @@ LIFT = """def lift():
 end
 """
 HEAVY = Payload(mass=5.0, com=(0.0, 0.0, 0.05), inertia=(0.01, 0.0, 0.0, 0.01, 0.0, 0.01))
+
+
+@pytest.fixture(autouse=True)
+def built_here(monkeypatch):
+    """Build scenes in this process; tests/plant/test_world.py builds them apart."""
+    monkeypatch.setattr("tvist_plant.world.mujoco_arm.build_apart", lambda asked: build(*asked))
 
 
 def config(tmp_path, cell=CELL):

@@ -30,8 +30,8 @@ PERIOD = 0.002
 
 @pytest.mark.parametrize("joints", [1, 4, 6, 7])
 def test_every_output_variable_is_finite_for_any_number_of_joints(ur5e, joints):
-    description = chain(7) if joints == 7 else UR5E if joints == 6 else cut(joints)
-    robot = ur5e(description, q=(0.4,) * joints if joints == 7 else description.poses["Q1"])
+    seven = msgspec.structs.replace(chain(7), poses={"Q1": (0.4,) * 7})
+    robot = ur5e(seven if joints == 7 else UR5E if joints == 6 else cut(joints))
     robot.send(c.MoveJ, q=tuple(0.9 * angle for angle in robot.controller.setup.q))
     snapshot = robot.tick(40)
     for name, kind in OUTPUT_TYPES.items():
