@@ -96,7 +96,7 @@ def security_of(config: ServeConfig, names: Sequence[str]) -> tuple[list[str], d
 def ur_interfaces(robot: ServedRobot, config: ServeConfig, number: int) -> "UrInterfaces":
     """Create the UR interfaces of a robot by its index; StartError if others could reach them unprotected."""
     from tvist_server.gateways.ur.interfaces import UrInterfaces
-    from tvist_server.gateways.ur.rtde.inputs import matching
+    from tvist_server.gateways.ur.rtde.variables import matching
 
     address, ports = config.interfaces(number)
     check_ur_address(address, insecure=config.insecure)

@@ -9,11 +9,10 @@ from hypothesis import strategies as st
 from tests.controller.robots import UR5E, cut
 from tests.examples import examples
 
-from tvist_server.gateways.ur.rtde.inputs import INPUTS
-from tvist_server.gateways.ur.rtde.outputs import OUTPUTS, PARTS
 from tvist_server.gateways.ur.rtde.package_encoder import PackageEncoder
 from tvist_server.gateways.ur.rtde.recipes import InputRecipe, OutputRecipe, split
 from tvist_server.gateways.ur.rtde.table import page
+from tvist_server.gateways.ur.rtde.variables import INPUTS, OUTPUTS, PARTS
 from tvist_server.rtde.wire import WireType
 
 from . import rtde_client as client

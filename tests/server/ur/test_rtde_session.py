@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from tvist_protocol.commands import SetSpeed
 from tvist_protocol.io import Registers, SetIo, SetRegisters
 from tvist_server.gateways.ur.robot import InputOwners
-from tvist_server.gateways.ur.rtde.inputs import matching
 from tvist_server.gateways.ur.rtde.package_encoder import PackageEncoder
 from tvist_server.gateways.ur.rtde.session import RtdeSession, ticks_between
+from tvist_server.gateways.ur.rtde.variables import matching
 from tvist_server.gateways.ur.version import VERSION
 
 from . import rtde_client as client

@@ -22,14 +22,7 @@ SKIPS: Final[dict[str, Literal["statements", "move"]]] = {"skipbuffer": "stateme
 LONGEST: Final = MAX_SCRIPT
 """Longest line [bytes]."""
 ECHO: Final = 4096  # characters of a line that its answer repeats
-NO_PROGRAM, TOO_MANY, SYNTAX, COMPILATION, TOO_LONG = (
-    "Program is in an invalid state",
-    "Too many interpreted messages",
-    "Syntax error",
-    "Compile error",
-    "Statement is too long",
-)
-"""Reasons of a `discard`, by which clients recognize it; all but the last are UR's."""
+TOO_LONG: Final = "Statement is too long"  # reason of a `discard`; the others are UR's
 
 
 @dataclass(eq=False)
@@ -79,13 +72,13 @@ class InterpreterSession(InTurnSession[tuple[str, bool]]):
 
 
 def _reason(refused: Refused) -> str:
-    """Return the reason of a refusal, with the column if the line is invalid."""
+    """Return the reason of a refusal as UR gives it, with the column if the line is invalid."""
     why, reason = refused.why, ""
     if refused.code == "script_error":
-        reason = SYNTAX if why.startswith("syntax_error") else COMPILATION
+        reason = "Syntax error" if why.startswith("syntax_error") else "Compile error"
         why = f"column {refused.where.rpartition(':')[2]}, {why}"
     elif refused.code == "wrong_mode":
-        reason = NO_PROGRAM
+        reason = "Program is in an invalid state"
     elif (refused.code, refused.where) == ("busy", "text"):
-        reason = TOO_MANY
+        reason = "Too many interpreted messages"
     return f"{reason}: {why}" if reason else why

@@ -6,15 +6,15 @@ and no source in text messages.
 
 from collections.abc import Callable, Mapping
 from math import floor
-from struct import Struct
+from struct import Struct, pack
 
 from tvist_controller.instruments.snapshot import Snapshot
 from tvist_server.gateways.ur.base import PortSession, Send
 from tvist_server.gateways.ur.lease import ConnectionControl
 from tvist_server.gateways.ur.robot import UrRobot
-from tvist_server.gateways.ur.rtde.inputs import INPUTS, NEED_CONTROL
 from tvist_server.gateways.ur.rtde.package_encoder import PackageEncoder
 from tvist_server.gateways.ur.rtde.recipes import InputRecipe, OutputRecipe, split
+from tvist_server.gateways.ur.rtde.variables import INPUTS, NEED_CONTROL
 from tvist_server.gateways.ur.rtde.writing import InputWriter
 from tvist_server.gateways.ur.version import VERSION
 from tvist_server.rtde.codec import PackageKind, PackageReader, package, warning, words
@@ -27,7 +27,6 @@ OUTPUT_ID = b"\x01"  # id of the output recipe: a connection has only one
 
 _UINT16 = Struct(">H")
 _DOUBLE = Struct(">d")
-_VERSION = Struct(">4I")
 _TRUE, _FALSE = b"\x01", b"\x00"
 
 
@@ -100,7 +99,7 @@ class RtdeSession(PortSession):
         self._send(package(PackageKind.REQUEST_PROTOCOL_VERSION, _TRUE if accepted else _FALSE))
 
     def _tell_version(self, _payload: bytes) -> None:
-        self._send(package(PackageKind.GET_URCONTROL_VERSION, _VERSION.pack(*VERSION)))
+        self._send(package(PackageKind.GET_URCONTROL_VERSION, pack(">4I", *VERSION)))
 
     def _set_up_outputs(self, payload: bytes) -> None:
         """Replace the output recipe; answer with types and, in version 2, an id: 0 if the recipe is invalid."""

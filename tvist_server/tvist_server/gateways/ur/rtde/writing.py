@@ -13,8 +13,8 @@ from tvist_protocol.replies import Refused, Reply
 from tvist_server.gateways.ur.deferred import begin
 from tvist_server.gateways.ur.lease import ConnectionControl, MakeCommand
 from tvist_server.gateways.ur.robot import UrRobot
-from tvist_server.gateways.ur.rtde.inputs import DIGITAL, REGISTERS
 from tvist_server.gateways.ur.rtde.recipes import Value
+from tvist_server.gateways.ur.rtde.variables import DIGITAL, REGISTERS
 from tvist_server.rtde.wire import WireType
 
 Number = bool | int | float
