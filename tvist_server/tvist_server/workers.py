@@ -53,7 +53,12 @@ class _Worker:
     who: str  # description of the process and its robots
     process: multiprocessing.process.BaseProcess
     pipe: Connection
-    told: WorkerEnded | None = None
+    ended: WorkerEnded | None = None  # its last news
+
+    def send(self, word: object) -> None:
+        """Send it a word, unless it has died, which `run` reports."""
+        with contextlib.suppress(OSError):
+            self.pipe.send(word)
 
 
 class Workers:
@@ -82,7 +87,7 @@ class Workers:
             self.page = self._made(self._front[0]).page
             """Address of the page with figures for Prometheus; None if they are not published."""
             if prepare is not None:
-                prepare(lambda done, total: self._tell_front((done, total)))
+                prepare(lambda done, total: self._front[0].send((done, total)))
             for setup in {id(setup.description): setup for setup in self.setups}.values():
                 _rehearse(setup)
             self._fork()
@@ -99,7 +104,7 @@ class Workers:
         why: str | None = None
         try:
             for worker in self._workers:
-                worker.pipe.send(True)
+                worker.send(True)
             waiting: dict[Any, _Worker] = {worker.pipe: worker for worker in self._front + self._workers}
             starting = len(self._workers)
             while why is None:
@@ -113,7 +118,7 @@ class Workers:
                         continue
                     starting -= 1
                     if starting == 0:
-                        self._tell_front(True)
+                        self._front[0].send(True)
                     elif starting < 0:
                         ready()
         finally:
@@ -127,8 +132,7 @@ class Workers:
         failures: list[str] = []
         for group in (self._workers, self._front):  # clients read until the robots have ended
             for worker in group:
-                with contextlib.suppress(OSError):  # it has died
-                    worker.pipe.send(False)
+                worker.send(False)
             failures += [failure for worker in group for failure in self._end(worker)]
             group.clear()
         self._folder.close()
@@ -169,10 +173,6 @@ class Workers:
         theirs.close()
         return _Worker(who, process, ours)
 
-    def _tell_front(self, word: object) -> None:
-        with contextlib.suppress(OSError):  # it has died, which `run` reports
-            self._front[0].pipe.send(word)
-
     def _made(self, worker: _Worker) -> WorkerMade:
         news = self._news(worker)
         if isinstance(news, WorkerMade):
@@ -187,7 +187,7 @@ class Workers:
         except (EOFError, OSError):
             return None
         if isinstance(news, WorkerEnded):
-            worker.told = news
+            worker.ended = news
             self.recordings += news.recordings
         return news
 
@@ -207,15 +207,15 @@ class Workers:
 
     def _end(self, worker: _Worker) -> list[str]:
         """Wait for the end of a process that was told to end; return failures."""
-        already = worker.told is not None or not worker.process.is_alive()
-        while worker.told is None and worker.pipe.poll(END) and self._news(worker) is not None:
+        already = worker.ended is not None or not worker.process.is_alive()
+        while worker.ended is None and worker.pipe.poll(END) and self._news(worker) is not None:
             pass
         worker.process.join(END)
         if worker.process.is_alive():
             worker.process.kill()
             worker.process.join()
             return [f"{worker.who} did not end within {END:g} s and was killed"]
-        failure = None if worker.told is None else worker.told.failure
+        failure = None if worker.ended is None else worker.ended.failure
         return [] if failure is None or already else [failure]
 
 
