@@ -68,18 +68,14 @@ class UrInterfaces(Gateway):
     ) -> None:
         self.address = address
         self._intake, self._gripper = intake, gripper
-        self._throttles = [
-            Throttle(MOST_LINES, f"lines about {what}") for what in ("scripts", "refusals", "clients")
-        ]
+        subjects = ("scripts", "refusals", "clients")
+        self._throttles = {what: Throttle(MOST_LINES, f"lines about {what}") for what in subjects}
         external = ExternalControl(programs or ProgramFolder(), self._fetch, self._read_aside)
-        self.robot = UrRobot(
-            description, name, self._tell, external, partial(self._log, 0), partial(self._log, 1)
-        )
+        scripts, refusals = partial(self._log, "scripts"), partial(self._log, "refusals")
+        self.robot = UrRobot(description, name, self._tell, external, scripts, refusals)
         self.robot.inputs.take(reserved, self)
-        self._instruments, self._encoders = (
-            Instruments(description),
-            defaultdict[int, PackageEncoder](PackageEncoder),
-        )
+        self._instruments = Instruments(description)
+        self._encoders = defaultdict[int, PackageEncoder](PackageEncoder)
         self._io: Io | None = None
         self._early = deque[Report](maxlen=FIRST)
         """States from before `open`: temperatures and energies are integrated from the first tick."""
@@ -123,7 +119,7 @@ class UrInterfaces(Gateway):
         # One event loop serves all clients: another process would be a millisecond late and decode everything
         # twice, and a thread per client would compete with the tick.
         self._loop = asyncio.get_running_loop()
-        limit = ConnectionLimit(self._loop.time, partial(self._log, 2))
+        limit = ConnectionLimit(self._loop.time, partial(self._log, "clients"))
         self._connections = limit.taken
         if self._io is not None:
             self.robot.programs.io(self._io)
@@ -182,7 +178,7 @@ class UrInterfaces(Gateway):
         await asyncio.sleep(0)  # lets the connections end
         self._loop = None
         self._room.set()  # releases a thread that waits to pass on a state
-        self._write(line for throttle in self._throttles for line in throttle.rest())
+        self._write(line for throttle in self._throttles.values() for line in throttle.rest())
 
     def close(self) -> None:
         self._loop = None
@@ -303,11 +299,11 @@ class UrInterfaces(Gateway):
             for lease in self._leases.values():
                 lease.keep_alive()
             now = time.monotonic()
-            self._write(line for throttle in self._throttles for line in throttle.due(now))
+            self._write(line for throttle in self._throttles.values() for line in throttle.due(now))
 
-    def _log(self, throttle: int, line: str) -> None:
-        """Write a line to the server's console, unless one of the throttles has let enough through."""
-        self._write(self._throttles[throttle].take(line, time.monotonic()))
+    def _log(self, what: str, line: str) -> None:
+        """Write a line about a subject to the server's console, unless there were enough of them."""
+        self._write(self._throttles[what].take(line, time.monotonic()))
 
     def _write(self, lines: Iterable[str]) -> None:
         for line in lines:
