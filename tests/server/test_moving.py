@@ -14,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.controller.robots import UR5E, Robot
 from tests.examples import examples
+from tests.server.test_watching import answers
 
 from tvist_controller.instruments.snapshot import Instruments
 from tvist_controller.kinematics.arm import Arm
@@ -66,14 +67,9 @@ PLAYING = replace(GOOD, modes=(7, 1, RuntimeState.PLAYING))
 FAR = place_of("ur://127.0.0.1:9")
 
 
-def set_up(commanding, types, outputs=b"DOUBLE"):
-    answers = [
-        (PackageKind.REQUEST_PROTOCOL_VERSION, b"\x01"),
-        (PackageKind.GET_URCONTROL_VERSION, struct.pack(">4I", 5, 22, 0, 1)),
-        (PackageKind.SETUP_OUTPUTS, b"\x01" + outputs),
-        (PackageKind.SETUP_INPUTS, b"\x07" + types),
-    ]
-    return [commanding.receive(package(*answer)).send for answer in answers]
+def set_up(client, types, outputs=b"DOUBLE"):
+    for answer in (*answers(outputs), package(PackageKind.SETUP_INPUTS, b"\x07" + types)):
+        client.receive(answer)
 
 
 @pytest.mark.parametrize(

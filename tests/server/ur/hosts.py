@@ -41,3 +41,27 @@ def host(robot):
 def told(robot):
     """The robot messages that were broadcast."""
     return [message(package) for package in robot.told]
+
+
+class LineClient:
+    """One client of a text interface: sends text, and reads lines."""
+
+    def __init__(self, kind, robot, control):
+        self.sent = []
+        self.session = kind(robot, control, self.sent.append)
+        self.session.opened()
+        self.heard()
+
+    def heard(self):
+        """The lines since the last call."""
+        text, self.sent[:] = b"".join(self.sent).decode(), []
+        assert not text or text.endswith("\n")
+        return text.split("\n")[:-1]
+
+    def send(self, text):
+        self.session.receive(text.encode())
+        return self.heard()
+
+    def ask(self, text):
+        (line,) = self.send(text + "\n")
+        return line

@@ -15,10 +15,8 @@ from tvist_server.gateways.ur.connection import (
     ConnectionLimit,
 )
 
-from .desks import PATIENCE, connect, lines, until
-
-VERSION_2 = struct.pack(">HBH", 5, ord("V"), 2)
-START, PAUSE = (struct.pack(">HB", 3, ord(letter)) for letter in "SP")
+from . import rtde_client
+from .desks import PATIENCE, connect, connect_and_greet, lines, until
 
 
 async def is_cut_off(reader):
@@ -41,16 +39,14 @@ async def package(reader):
 async def rtde(desk):
     """A client of RTDE that is being served."""
     reader, writer = await connect(desk, "rtde")
-    recipe = struct.pack(">HBd", 11 + len("timestamp"), ord("O"), 500.0) + b"timestamp"
-    writer.write(VERSION_2 + recipe + START)
+    writer.write(rtde_client.version() + rtde_client.outputs(["timestamp"]) + rtde_client.package("S"))
     assert [await package(reader) for _ in range(3)] == [b"V", b"O", b"S"]
     return reader, writer
 
 
 async def dashboard(desk):
     """A client of the dashboard that has said something."""
-    reader, writer = await connect(desk, "dashboard")
-    assert (await reader.readline()).startswith(b"Connected")
+    reader, writer = await connect_and_greet(desk)
     assert await lines(reader, writer, "robotmode") == ["Robotmode: RUNNING"]
     return reader, writer
 
@@ -104,7 +100,7 @@ async def test_served_clients_are_never_displaced(later, desk, caplog):
     assert "was refused: 256 of 256 connections are in use" in caplog.text
     await desk.tick()
     assert await package(served) == b"U"
-    writer.write(PAUSE)
+    writer.write(rtde_client.package("P"))
     assert await package(served) == b"P"
     reader, _ = await connect(desk, "primary")
     assert len(await reader.readexactly(5)) == 5

@@ -16,7 +16,7 @@ from tvist_server.gateways.ur.dashboard import COMMANDS, LONGEST, DashboardSessi
 
 from .conftest import FakeControl
 from .decoders import message
-from .hosts import host, told
+from .hosts import LineClient, host, told
 
 
 def at(tick=100, **values):
@@ -30,30 +30,6 @@ def moved_to(robot, **values):
     robot.latest = at(**values)
 
 
-class Client:
-    """One client: asks, and hears lines."""
-
-    def __init__(self, robot, control):
-        self.sent = []
-        self.session = DashboardSession(robot, control, self.sent.append)
-        self.session.opened()
-        self.heard()
-
-    def heard(self):
-        """The lines since the last look."""
-        text, self.sent[:] = b"".join(self.sent).decode(), []
-        assert not text or text.endswith("\n")
-        return text.split("\n")[:-1]
-
-    def send(self, text):
-        self.session.receive(text.encode())
-        return self.heard()
-
-    def ask(self, text):
-        (line,) = self.send(text + "\n")
-        return line
-
-
 @pytest.fixture
 def desk(robot):
     """The robot, running and at rest."""
@@ -63,7 +39,7 @@ def desk(robot):
 
 @pytest.fixture
 def client(desk, control):
-    return Client(desk, control)
+    return LineClient(DashboardSession, desk, control)
 
 
 # What clients match whole lines against, or compare them with.
@@ -117,7 +93,7 @@ def test_answers_are_those_that_clients_compare(robot, control):
     for line in MATCHED:
         moved_to(robot)
         said, answer = line.split(" -> ")
-        (heard,) = Client(host(robot), control).send(said + "\r\n")
+        (heard,) = LineClient(DashboardSession, host(robot), control).send(said + "\r\n")
         assert re.fullmatch(answer, heard), line
         asked |= {find(said)[0]} if find(said) else set()
     assert asked == set(COMMANDS)
@@ -190,7 +166,7 @@ def test_modes_have_ur_s_names(client, desk):
 
 def test_the_operational_mode_is_shared_by_all_clients(client, desk, control):
     client.ask("set operational mode automatic")
-    assert Client(desk, control).ask("get operational mode") == "AUTOMATIC"
+    assert LineClient(DashboardSession, desk, control).ask("get operational mode") == "AUTOMATIC"
     client.ask("clear operational mode")
     assert client.ask("get operational mode") == "NONE"
 
@@ -286,7 +262,7 @@ def test_every_line_gets_exactly_one_answer(lines, data):
     control = FakeControl()
     control.held_by_other = data.draw(st.booleans())
     control.change = lambda _: control.asked(data.draw(replies))
-    client = Client(robot, control)
+    client = LineClient(DashboardSession, robot, control)
     stream = b"".join(line + b"\n" for line in lines)
     cut = data.draw(st.integers(0, len(stream)))
     client.session.receive(stream[:cut])

@@ -18,6 +18,7 @@ from tvist_protocol.programs import ProgramStop
 from tvist_server.gateways.base import GatewayError
 from tvist_server.gateways.ur.interfaces import UrInterfaces
 
+from . import rtde_client
 from .desks import PATIENCE, connect, connect_and_greet, lines, until
 
 
@@ -37,7 +38,7 @@ async def test_every_port_answers_in_its_protocol(desk):
         package = await reader.readexactly(1220)
         assert struct.unpack_from(">id", package) == (1220, 40.0 + desk.controller.now)
     reader, writer = await connect(desk, "rtde")
-    writer.write(struct.pack(">HBH", 5, ord("V"), 2))
+    writer.write(rtde_client.version())
     assert await reader.readexactly(4) == struct.pack(">HBB", 4, ord("V"), 1)
 
 
@@ -159,9 +160,8 @@ async def test_reading_is_paused_while_many_commands_wait(desk, monkeypatch):
 
 async def test_a_tick_leaves_no_reference_cycles(desk):
     reader, writer = await connect(desk, "rtde")
-    names = b"actual_q,target_current,output_int_register_3"
-    recipe = struct.pack(">HBd", 11 + len(names), ord("O"), 500.0) + names
-    writer.write(struct.pack(">HBH", 5, ord("V"), 2) + recipe + struct.pack(">HB", 3, ord("S")))
+    recipe = rtde_client.outputs(["actual_q", "target_current", "output_int_register_3"])
+    writer.write(rtde_client.version() + recipe + rtde_client.package("S"))
     for _ in range(3):
         await reader.readexactly(struct.unpack(">H", await reader.readexactly(2))[0] - 2)
     gc.collect()
