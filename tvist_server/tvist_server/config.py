@@ -107,7 +107,7 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
             raise StartError(f"ur_address is {self.ur_address!r}: must be an IP address ({error})") from error
         if number and first.is_unspecified:
             raise StartError(
-                f"ur_address is {self.ur_address}, but several robots need one address each: give the first one's"
+                f"ur_address is {self.ur_address}, but several robots need one address each: give the first"
             )
         ports = self.ur_ports.open()
         if self.cell is not None and self.ur_ports.gripper:

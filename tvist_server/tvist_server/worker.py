@@ -163,8 +163,8 @@ def serve_router(
 def serve_robots(config: ServeConfig, share: Share, parent: ParentPipe) -> None:
     """Serve robots until the first process ends it or dies.
 
-    It makes its robots and reports `WorkerMade`; on the first word it starts them and reports `WorkerReady`; on the
-    last it reports `WorkerEnded`. The first process handles the signals that a terminal sends to all.
+    It makes its robots and reports `WorkerMade`; on the first word it starts them and reports `WorkerReady`;
+    on the last it reports `WorkerEnded`. The first process handles the signals that a terminal sends to all.
     """
     ending = Shutdown()
     ending.close()  # ignores signals

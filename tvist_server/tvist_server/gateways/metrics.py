@@ -97,7 +97,7 @@ class Metrics(Collector):
 
 
 Figure = tuple[str, str, str, str, Callable[[MetricsGateway], Mapping[str, float]]]
-"""Type, name behind `tvist_` and meaning, name of a further label or "", and the numbers of a robot by its value."""
+"""Type, name behind `tvist_`, meaning, name of a further label or "", and numbers of a robot by label."""
 
 
 def _figures() -> Iterator[Figure]:
@@ -112,10 +112,10 @@ def _figures() -> Iterator[Figure]:
     yield "counter", "warnings", what, "code", lambda robot: robot.warnings.copy()
 
 
-def _fields(source: str, fields: Mapping[str, str], unit: float, robot: MetricsGateway) -> dict[str, float]:
+def _fields(source: str, fields: Mapping[str, str], unit: float, of: MetricsGateway) -> dict[str, float]:
     """Return a robot's fields of a message that are known, by their keys in `fields`."""
-    message = getattr(robot, source)
-    found = {} if message is None else {key: getattr(message, field) for key, field in fields.items()}
+    message = getattr(of, source)
+    found = {key: getattr(message, field, None) for key, field in fields.items()}
     return {key: unit * value for key, value in found.items() if value is not None}
 
 
@@ -147,7 +147,8 @@ FIGURES = {
 }  # fmt: skip
 """Type, field and meaning of each figure, by the message that has the field."""
 NAMES = {
-    "tick": "ticks", "load": "load_ratio", "refused": "commands_refused", "dropped_states": "states_dropped",
+    "tick": "ticks", "load": "load_ratio", "refused": "commands_refused",
+    "dropped_states": "states_dropped",
 }  # fmt: skip
 """Names of figures that are not those of their fields; each begins with `tvist_`."""
 QUANTILES = {"0.5": "late_p50_us", "0.99": "late_p99_us", "1": "late_max_us"}

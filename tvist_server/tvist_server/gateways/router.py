@@ -53,7 +53,7 @@ def start_router(
     """
     check_endpoints("connect", connect)
     endpoints, guard = router_security(listen, security=security, insecure=insecure)
-    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)  # usually 1024 of what the system permits are set
+    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)  # usually 1024 are set
     resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
     limits = {"downsampling": downsampling(rates, robots)} if rates else {}
     settings = {**REALTIME, "transport/unicast/max_sessions": SESSIONS, **guard, **limits}

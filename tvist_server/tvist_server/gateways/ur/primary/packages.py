@@ -148,7 +148,7 @@ def _configuration(description: RobotDescription) -> bytes:
     ]
     a, d, alpha = _denavit_hartenberg(description)
     theta = [0.0] * MOST_JOINTS
-    numbers = (6, 4, robot_type(description), 3)  # masterboard, box, arm, subtype of an e-Series arm
+    numbers = (6, 4, robot_type(description), 3)  # masterboard, box, arm, e-Series
     return pack(">53d4i", *position, *motion, *MOTION_DEFAULTS, *a, *d, *alpha, *theta, *numbers)
 
 

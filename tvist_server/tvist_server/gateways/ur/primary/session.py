@@ -33,7 +33,7 @@ CHANGES: Final[Mapping[str, Change]] = {
 class ScriptSession(InTurnSession[Unit]):
     """Runs a few commands of the interface, and other script text as programs; the console shows the results."""
 
-    read_only: bool = field(default=False, kw_only=True)  # whether the client's commands are refused
+    read_only: bool = field(default=False, kw_only=True)  # whether commands are refused
     _reader: ScriptReader = field(default_factory=ScriptReader, init=False)
 
     def receive(self, data: bytes) -> None:
@@ -102,7 +102,7 @@ class PrimarySession(ScriptSession):
     """Sends a client the robot's state and messages, and takes its commands; the secondary one has no messages."""
 
     informed: bool = field(default=True, kw_only=True)
-    _errors: list[bytes] = field(default_factory=list, init=False)  # of this tick, sent after its state
+    _errors: list[bytes] = field(default_factory=list, init=False)  # sent after the state of the tick
     _due: int = field(default=0, init=False)  # tick of the next robot state
     _safety_mode: int | None = field(default=None, init=False)  # last sent to the client
 

@@ -1,4 +1,4 @@
-"""Input variables, which clients set, output variables, which they read, and registers: names and types."""
+"""Names and types of input variables, which clients set, outputs, which they read, and registers."""
 
 from collections.abc import Callable, Iterable, Iterator
 from fnmatch import fnmatchcase
