@@ -27,7 +27,7 @@ from tvist_protocol import keys
 from tvist_protocol.codec import decode
 from tvist_protocol.stream import State
 from tvist_server.gateways.network import REALTIME, open_router
-from tvist_server.gateways.ur.rtde.outputs import OUTPUTS
+from tvist_server.gateways.ur.rtde.variables import OUTPUTS
 from tvist_server.rtde.codec import PackageKind, PackageReader, package
 from tvist_server.schedule import Schedule
 

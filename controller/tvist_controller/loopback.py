@@ -1,6 +1,7 @@
 """An in-process server without network, thread or clock; time advances when a client steps it."""
 
 from collections.abc import Callable
+from typing import cast
 
 from tvist_controller.controller import Controller
 from tvist_controller.host import Host
@@ -8,6 +9,7 @@ from tvist_controller.instruments.report import Report, Sink, Topic
 from tvist_controller.safety.payload_learning import PayloadLearning, payload_learning_of
 from tvist_controller.setup import Setup
 from tvist_plant.plant import Plant
+from tvist_protocol.channels import tag
 from tvist_protocol.codec import encode
 from tvist_protocol.io import Io
 from tvist_protocol.journal import Entry
@@ -57,28 +59,19 @@ class LoopbackHost(Sink):
         return lambda: callbacks.remove(callback)
 
     def report(self, report: Report) -> None:
-        """Pass on a state."""
-        self._put("state", lambda: report.encoded)
+        """Pass on a state, which is encoded only for subscribers."""
+        for callback in tuple(self._callbacks.get("state", ())):
+            callback(report.encoded)
 
-    def event(self, event: Event) -> None:
-        """Pass on an event."""
-        self._put("event", lambda: encode(event))
+    def publish(self, message: Event | Truth | Io) -> None:
+        """Pass on a message other than a state."""
+        callbacks = tuple(self._callbacks.get(cast("Topic", tag(type(message))), ()))
+        data = encode(message) if callbacks else b""
+        for callback in callbacks:
+            callback(data)
 
-    def truth(self, truth: Truth) -> None:
-        """Pass on what a real robot cannot measure."""
-        self._put("truth", lambda: encode(truth))
-
-    def io(self, io: Io) -> None:
-        """Pass on inputs, outputs and registers."""
-        self._put("io", lambda: encode(io))
+    event = truth = io = publish
 
     def journal(self, entry: Entry) -> None:
         """Store an entry."""
         self.entries.append(entry)
-
-    def _put(self, topic: Topic, encoded: Callable[[], bytes]) -> None:
-        callbacks = self._callbacks.get(topic)
-        if callbacks:
-            data = encoded()
-            for callback in tuple(callbacks):
-                callback(data)

@@ -17,8 +17,8 @@ from tvist_protocol.recorded import TICK_NS
 from tvist_protocol.replies import Refused
 from tvist_protocol.stream import Event, State, Truth
 from tvist_server.gateways.base import Answer, CommandIntake, Gateway, topic_of
-from tvist_server.gateways.exposure import guarded
 from tvist_server.gateways.network import Network
+from tvist_server.gateways.security import server_security
 
 TICK = TICK_NS * 1e-9  # duration of a tick [s]
 LEAVE = 0.6  # longest time for clients to read the remaining messages at the end [s]
@@ -71,7 +71,7 @@ class Playback:
         self.name = keys.check_robot_name(name or content.robot)
         self.states = 0
         self._content, self._speed, self._loop = content, speed, loop
-        endpoints, guard = guarded(listen, [self.name], security=security, insecure=insecure)
+        endpoints, guard = server_security(listen, [self.name], security=security, insecure=insecure)
         self._desk = PlaybackDesk(content.info, self.name)
         self._network = Network(endpoints, guard, lockstep=False)
         try:

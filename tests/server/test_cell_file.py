@@ -1,4 +1,4 @@
-"""A wrong cell file is refused with its key, the value, and what is allowed; a right one gives tool and payload."""
+"""Cell files: invalid ones are refused with key, value and limit; valid ones give tool and payload."""
 
 import re
 from pathlib import Path
@@ -35,7 +35,7 @@ GOOD = EXAMPLE.read_text(encoding="utf-8")
         ("[[wires]]", "[[wires]", "not valid TOML"),
     ],
 )  # fmt: skip
-def test_a_wrong_file_is_refused_with_key_value_and_limit(tmp_path, right, wrong, said):
+def test_an_invalid_cell_file_is_refused_with_key_value_and_limit(tmp_path, right, wrong, said):
     assert right in GOOD
     file = tmp_path / "cell.toml"
     file.write_text(GOOD.replace(right, wrong, 1), encoding="utf-8")
@@ -51,13 +51,13 @@ def test_the_first_tool_is_carried_and_declared_unless_a_payload_is_given():
     assert (other.payload.mass, other.carried.mass) == (2.0, 0.92)
 
 
-def test_a_recording_has_the_whole_cell():
+def test_the_cell_is_recorded_completely():
     setup = ServeConfig(cell=str(EXAMPLE), clock="lockstep").setup()
     assert Setup.from_builtins(setup.to_builtins()).cell == setup.cell
     assert "cell" not in ServeConfig().setup().to_builtins()
 
 
-def test_the_page_has_a_valid_file_and_all_keys(tmp_path):
+def test_the_example_in_the_guide_is_valid_and_the_guide_lists_all_keys(tmp_path):
     file = tmp_path / "cell.toml"
     file.write_text(re.search(r"```toml\n(.*?)```", PAGE, re.DOTALL)[1], encoding="utf-8")
     assert ServeConfig(cell=str(file)).setup().cell.gripper is not None

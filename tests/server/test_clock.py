@@ -1,4 +1,4 @@
-"""Clocks that drive robots: what waits is done before a tick, and what the system does not permit is said."""
+"""Clocks of robots: jobs run before a tick, and exceptions end only their robot."""
 
 import os
 import threading
@@ -55,7 +55,7 @@ def ticking(*robots, **options):
     clock.close()
 
 
-def test_one_thread_ticks_all_robots_and_says_how_late_each_was():
+def test_one_thread_ticks_all_robots_and_measures_their_lateness():
     robots = [TickedRobot(FakeHost()) for _ in range(3)]
     with ticking(*robots):
         pass
@@ -65,7 +65,7 @@ def test_one_thread_ticks_all_robots_and_says_how_late_each_was():
         assert robot.overload.missed == robot.host.missed_ticks <= robot.overload.due >= robot.host.ticks
 
 
-def test_jobs_are_done_in_order_before_the_next_tick_and_all_before_the_end():
+def test_jobs_run_in_order_before_the_next_tick_and_before_the_end():
     robot, seen = TickedRobot(FakeHost()), []
     for number in range(100):
         robot.post(lambda number=number: seen.append((number, robot.host.ticks)))
@@ -75,7 +75,7 @@ def test_jobs_are_done_in_order_before_the_next_tick_and_all_before_the_end():
     assert seen == [*((number, 0) for number in range(100)), "last"]
 
 
-def test_an_arm_that_does_not_begin_its_tick_keeps_no_client_waiting_and_is_told_of_once():
+def test_clients_are_answered_and_warned_once_while_the_arm_gives_no_tick():
     paces = [True, False, False, True, False]
     robot = TickedRobot(FakeHost(), pace=lambda timeout: paces.pop(0) if paces else time.sleep(timeout))
     answered = threading.Event()
@@ -89,7 +89,7 @@ def test_an_arm_that_does_not_begin_its_tick_keeps_no_client_waiting_and_is_told
     assert ["does not begin" in why for why in robot.host.warned] == [True, True]
 
 
-def test_an_arm_that_fails_while_it_begins_its_tick_has_it_from_the_clock_and_stops():
+def test_the_clock_ticks_an_arm_that_fails_to_give_its_tick():
     def fails(_):
         raise PlantError("no cable")
 
@@ -107,7 +107,7 @@ class Failing(FakeHost):
 
 
 @pytest.mark.parametrize("failing", ["tick", "job"])
-def test_a_tick_or_job_that_fails_ends_its_robot_alone_whose_clients_are_still_answered(caplog, failing):
+def test_an_exception_in_a_tick_or_job_ends_only_that_robot(caplog, failing):
     other, robot, answered = TickedRobot(FakeHost()), TickedRobot(Failing()), threading.Event()
     robot.host.error = ArithmeticError if failing == "tick" else None
     if failing == "job":
@@ -124,7 +124,7 @@ def test_a_tick_or_job_that_fails_ends_its_robot_alone_whose_clients_are_still_a
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, GeneratorExit])
-def test_what_ends_the_thread_ends_all_robots_and_says_so(caplog, error):
+def test_all_robots_end_with_the_tick_thread(caplog, error):
     robots = [TickedRobot(FakeHost()), TickedRobot(Failing())]
     robots[1].host.error = error
     clock = Realtime(robots, PERIOD)
@@ -135,7 +135,7 @@ def test_what_ends_the_thread_ends_all_robots_and_says_so(caplog, error):
     assert "on purpose" in caplog.text
 
 
-def test_an_arm_whose_call_never_returns_does_not_keep_the_server_from_ending(caplog, monkeypatch):
+def test_the_server_ends_although_a_call_of_the_arm_never_returns(caplog, monkeypatch):
     monkeypatch.setattr("tvist_server.clock.LONGEST_TICK", 0.1)
     begun, go_on = threading.Event(), threading.Event()
 
@@ -162,9 +162,7 @@ def recorder():
     ended.set()
 
 
-def test_real_time_priority_is_asked_for_by_the_tick_thread_and_next_to_it_for_who_takes_its_messages(
-    monkeypatch, recorder
-):
+def test_recorders_get_the_priority_below_that_of_the_tick_thread(monkeypatch, recorder):
     """Otherwise the tick waits for whatever program takes the processor from one that holds the interpreter's lock."""
     asked = []
 
@@ -183,7 +181,7 @@ def test_real_time_priority_is_asked_for_by_the_tick_thread_and_next_to_it_for_w
     ]
 
 
-def test_where_it_is_not_permitted_that_is_one_sentence_and_ticks_go_on(monkeypatch, caplog):
+def test_refused_real_time_priority_is_logged_and_the_robot_ticks(monkeypatch, caplog):
     def refuse(*_):
         raise PermissionError(1, "Operation not permitted")
 
@@ -198,7 +196,7 @@ def test_where_it_is_not_permitted_that_is_one_sentence_and_ticks_go_on(monkeypa
     assert robot.host.ticks >= 5
 
 
-def test_in_lockstep_no_tick_comes_by_itself_and_jobs_are_done():
+def test_in_lockstep_jobs_run_but_no_tick_starts_by_itself():
     robot, done = TickedRobot(FakeHost()), threading.Event()
     clock = Lockstep(robot, lambda: None)
     clock.start()
@@ -208,7 +206,7 @@ def test_in_lockstep_no_tick_comes_by_itself_and_jobs_are_done():
     assert robot.host.ticks == 0
 
 
-def test_in_lockstep_the_state_is_repeated_however_many_jobs_come(monkeypatch):
+def test_in_lockstep_the_state_is_repeated_even_if_many_jobs_arrive(monkeypatch):
     """A new client gets the state although telemetry, say, comes in as often."""
     monkeypatch.setattr("tvist_server.clock.REPEAT_EVERY", 0.01)
     robot, repeated = TickedRobot(FakeHost()), threading.Event()
@@ -224,7 +222,7 @@ def test_in_lockstep_the_state_is_repeated_however_many_jobs_come(monkeypatch):
     clock.close()
 
 
-def test_an_overload_is_told_to_the_robot_s_clients_when_it_begins_and_when_it_ends(monkeypatch):
+def test_clients_are_warned_when_an_overload_begins_and_when_it_ends(monkeypatch):
     """A clock of numbers: each tick takes 16 ms of it for a while, and then none."""
     passed, told = [0.0], threading.Event()
 

@@ -1,4 +1,4 @@
-"""Configuration and profiles: what is wrong is said in one sentence that names the key, and what options change."""
+"""Configuration and profiles: invalid values are refused with their key, and options have their effect."""
 
 import json
 import tomllib
@@ -14,9 +14,10 @@ from tvist_controller.sources import calibrations
 from tvist_plant.description import load
 from tvist_plant.user_file import UserFileError
 from tvist_protocol.calibration import calibration_to_json
+from tvist_server.assembly import check_together
 from tvist_server.config import ServeConfig, from_mapping
 from tvist_server.moving.servo_lag import ServoLag
-from tvist_server.option_values import MAX_ROBOTS, StartError, members, read_start_file, recording_of
+from tvist_server.option_values import MAX_ROBOTS, StartError, read_start_file, recording_of, robots_in
 from tvist_server.profiles import UR_START
 
 
@@ -50,7 +51,7 @@ def sentence(action, *arguments):
         ({"robots": "ur5e*2", "robot": "ur5e"}, "robots and robot exclude each other"),
     ],
 )
-def test_a_key_or_value_that_cannot_be(values, named):
+def test_an_unknown_key_or_invalid_value_is_refused_with_its_key(values, named):
     text = sentence(lambda: config(**values))
     assert text.startswith("tvist.toml: ")
     assert named in text
@@ -78,22 +79,22 @@ def test_a_key_or_value_that_cannot_be(values, named):
         ({"robots": "ur5e*2,ur5e-1.toml"}, "ur5e-1"),
     ],
 )
-def test_what_does_not_fit_the_rest(values, named):
+def test_a_value_that_contradicts_others_is_refused(values, named):
     assert named in sentence(lambda: config(**values).setups())
 
 
-def test_one_robot_has_the_name_of_its_file_and_several_have_numbers():
+def test_robots_are_named_after_their_files_and_numbered_if_there_are_several():
     def names(text):
-        return [name for _, name in members(text)]
+        return [name for _, name in robots_in(text)]
 
     assert names("ur5e") == names("ur5e*1") == ["ur5e"]
     assert names("ur5e*2,/a/b/other.toml") == ["ur5e-1", "ur5e-2", "other"]
     assert names("ur5e, other.toml*2 ,ur5e") == ["ur5e-1", "other-1", "other-2", "ur5e-2"]
-    assert [robot for robot, _ in members("ur5e,x/other.toml*2")] == ["ur5e", *2 * ["x/other.toml"]]
-    assert len(members(f"ur5e*{MAX_ROBOTS}")) == MAX_ROBOTS
+    assert [robot for robot, _ in robots_in("ur5e,x/other.toml*2")] == ["ur5e", *2 * ["x/other.toml"]]
+    assert len(robots_in(f"ur5e*{MAX_ROBOTS}")) == MAX_ROBOTS
 
 
-def test_each_of_several_robots_has_a_seed_and_a_recording_of_its_own():
+def test_each_robot_has_its_own_seed_and_recording():
     setups = from_mapping({"robots": "ur5e*3", "seed": 7, "shaper": "ei", "truth": True}, "").setups()
     assert [(setup.name, setup.seed) for setup in setups] == [("ur5e-1", 7), ("ur5e-2", 8), ("ur5e-3", 9)]
     assert all(setup.shaper == "ei" and setup.truth for setup in setups)
@@ -101,12 +102,11 @@ def test_each_of_several_robots_has_a_seed_and_a_recording_of_its_own():
     assert str(recording_of("out", "other")) == "out-other"
 
 
-def test_a_folder_for_the_last_second_that_is_none_is_refused_and_not_found_out_at_the_failure(tmp_path):
+def test_a_folder_that_does_not_exist_is_refused_at_the_start(tmp_path):
     (tmp_path / "file").touch()
-    for folder in ("file", "nowhere"):
-        assert f"dump is '{tmp_path / folder}': must be a folder" in sentence(
-            config(dump=str(tmp_path / folder)).dump_folder
-        )
+    for key, folder in (("dump", "file"), ("dump", "nowhere"), ("programs", "nowhere")):
+        text = sentence(check_together, config(**{key: str(tmp_path / folder)}), 1)
+        assert f"{key} is '{tmp_path / folder}': must be a folder" in text
     assert config(dump=str(tmp_path)).dump_folder() == tmp_path
 
 
@@ -118,14 +118,14 @@ def test_the_default_calibration_belongs_to_the_robot(robot, name):
     assert made.source().fits_arm
 
 
-def test_a_calibration_that_is_named_takes_the_place_of_the_default(tmp_path):
+def test_a_given_calibration_replaces_the_default(tmp_path):
     file = tmp_path / "mine.json"
     own = msgspec.structs.replace(calibrations.load("one-joint_1kg"), name="mine")
     file.write_bytes(calibration_to_json(own))
     assert config(robot="one-joint", calibration=str(file)).setup().calibration == own
 
 
-def test_a_robot_that_no_calibration_belongs_to_says_what_to_do(tmp_path):
+def test_a_robot_without_a_calibration_is_refused_with_the_next_step(tmp_path):
     file = tmp_path / "mine.toml"
     shipped = (resources.files("tvist_plant") / "robots" / "one-joint.toml").read_text("utf-8")
     file.write_text(shipped.replace('"one-joint arm"', '"mine"'), encoding="utf-8")
@@ -137,17 +137,17 @@ def test_a_robot_that_no_calibration_belongs_to_says_what_to_do(tmp_path):
 
 
 @pytest.mark.parametrize("start", [" 0.1, -1,2,0,0,0.5", [0.1, -1, 2, 0, 0, 0.5]])
-def test_a_start_by_its_angles(start):
+def test_the_start_can_be_given_as_joint_angles(start):
     assert config(start=start).setup().q == (0.1, -1.0, 2.0, 0.0, 0.0, 0.5)
 
 
-def test_another_payload_is_the_same_disc_in_less_steel():
+def test_inertia_scales_with_the_given_payload_mass():
     payload = config(payload=2.5).setup().payload
     assert (payload.mass, payload.com) == (2.5, UR5E.payload.com)
     assert payload.inertia == pytest.approx([value / 2.0 for value in UR5E.payload.inertia])
 
 
-def test_a_payload_above_the_rating_is_refused_and_says_how_to_insist():
+def test_a_payload_above_the_rating_needs_overload():
     assert sentence(config(payload=20.0).setup) == (
         "payload is 20 kg, above the ur5e's rating of 5 kg: give --overload to insist"
     )
@@ -155,7 +155,7 @@ def test_a_payload_above_the_rating_is_refused_and_says_how_to_insist():
     assert config(payload=20.0, overload=True).setup().payload.mass == 20.0
 
 
-def test_the_payload_of_a_robot_file_is_declared_too(tmp_path):
+def test_the_payload_of_a_robot_file_is_checked_against_the_rating(tmp_path):
     text = (resources.files("tvist_plant") / "robots" / "ur5e.toml").read_text(encoding="utf-8")
     path = tmp_path / "heavy.toml"
     path.write_text(text.replace("mass    = 5.0", "mass    = 7.5"), encoding="utf-8")
@@ -170,13 +170,13 @@ def test_the_payload_of_a_robot_file_is_declared_too(tmp_path):
         *((content, "mine.json") for content in (b"", b"{}", b"\xff", b'{"name": "x", "colour": 1}')),
     ],
 )
-def test_a_calibration_that_is_broken_or_of_another_robot_is_refused(tmp_path, content, said):
+def test_an_invalid_calibration_or_one_of_another_model_is_refused(tmp_path, content, said):
     path = tmp_path / "mine.json"
     path.write_bytes(content)
     assert said in sentence(config(calibration=str(path)).setup)
 
 
-def test_a_file_that_cannot_be_read_or_is_no_toml(tmp_path):
+def test_an_unreadable_or_invalid_file_is_refused_with_its_path(tmp_path):
     assert "nowhere.toml" in sentence(read_start_file, "nowhere.toml", "configuration", dict)
     broken = tmp_path / "broken.toml"
     broken.write_text("name = ")
@@ -186,7 +186,7 @@ def test_a_file_that_cannot_be_read_or_is_no_toml(tmp_path):
             config(**{key: str(tmp_path)}).setup()
 
 
-def test_a_setup_comes_back_from_its_recording_if_no_part_is_missing():
+def test_a_setup_is_restored_from_its_recording_only_if_it_is_complete():
     made = setup(calibration=calibration(), seed=3, truth=True, shaper="ei")
     assert Setup.from_builtins(made.to_builtins()) == made
     for missing in ("description", "q", "payload", "calibration", "seed"):
@@ -197,7 +197,7 @@ def test_a_setup_comes_back_from_its_recording_if_no_part_is_missing():
 
 
 @pytest.mark.parametrize("joints", [1, 6])
-def test_a_setup_of_any_number_of_joints_is_checked_for_that_number(joints):
+def test_a_setup_is_checked_against_the_number_of_joints(joints):
     description = cut(joints)
     setup(description).check()
     with pytest.raises(ValueError, match=f"{joints} joints"):
@@ -218,7 +218,7 @@ inertia = [0.01, 0, 0, 0.01, 0, 0.01]
 
 
 @pytest.mark.parametrize("name", ["state.toml", "state.json"])
-def test_a_state_to_start_in_goes_before_the_rest(tmp_path, name):
+def test_a_state_file_overrides_start_and_shaper(tmp_path, name):
     """What is carried may be above the rating."""
     file = tmp_path / name
     content = tomllib.loads(STATE)
@@ -243,13 +243,13 @@ def test_a_state_to_start_in_goes_before_the_rest(tmp_path, name):
         ("[payload]\nmass = -1\ncom = [0, 0, 0]\ninertia = [1, 0, 0, 1, 0, 1]", "payload.mass"),
     ],
 )
-def test_a_state_that_cannot_be(tmp_path, content, named):
+def test_an_invalid_state_file_is_refused_with_its_key(tmp_path, content, named):
     file = tmp_path / "state.toml"
     file.write_text(content)
     assert named in sentence(config(state=str(file)).setup)
 
 
-def test_a_machine_without_a_temporary_folder_serves_all_the_same(monkeypatch, tmp_path):
+def test_without_a_temporary_folder_dumps_go_to_the_working_directory(monkeypatch, tmp_path):
     def none():
         raise FileNotFoundError
 
@@ -262,9 +262,7 @@ def test_a_machine_without_a_temporary_folder_serves_all_the_same(monkeypatch, t
     ("values", "lag"),
     [({}, (0.05, 900.0)), ({"servo_lag": "0.1,400"}, (0.1, 400.0)), ({"calibration": "none"}, None)],
 )
-def test_the_servo_of_a_robot_that_is_moved_is_the_calibrations_unless_another_is_given(
-    tmp_path, values, lag
-):
+def test_the_servo_lag_is_that_of_the_calibration_unless_given(tmp_path, values, lag):
     file = tmp_path / "mine.json"
     known = msgspec.structs.replace(calibration(), robot="UR5e", servo_lag_s=0.05, servo_gain=900.0)
     file.write_bytes(calibration_to_json(known))
@@ -273,7 +271,7 @@ def test_the_servo_of_a_robot_that_is_moved_is_the_calibrations_unless_another_i
     assert moved.setup().plant.maker.keywords["lag"] == (lag and ServoLag(*lag))
 
 
-def test_without_a_profile_every_option_has_the_paper_s_value():
+def test_without_a_profile_defaults_are_those_of_the_paper():
     made, shipped = ServeConfig().setup(), load("ur5e")
     assert ServeConfig().profile_in_force is None
     assert made.description == shipped
@@ -283,7 +281,7 @@ def test_without_a_profile_every_option_has_the_paper_s_value():
 
 
 @pytest.mark.parametrize("options", [{"ur": True}, {"profile": "ursim"}])
-def test_ursim_is_the_profile_of_ur_s_interfaces(options):
+def test_ur_interfaces_select_the_profile_ursim(options):
     made = config(**options).setup()
     assert made.q == UR_START
     assert made.payload.mass == 0.0
@@ -292,7 +290,7 @@ def test_ursim_is_the_profile_of_ur_s_interfaces(options):
     assert made.description == UR5E.quiet().without_floor()
 
 
-def test_real_is_a_robot_without_a_profile_in_ur_s_posture():
+def test_the_profile_real_changes_only_the_start_posture():
     made = config(ur=True, profile="real").setup()
     assert made.q == UR_START
     assert made.to_builtins() | {"q": None} == config().setup().to_builtins() | {"q": None}
@@ -309,14 +307,14 @@ def test_explicit_options_take_precedence(profile, on):
     assert made.compensate_sag is on
 
 
-def test_a_state_takes_precedence_too(tmp_path):
+def test_a_state_file_takes_precedence_over_a_profile(tmp_path):
     file = tmp_path / "state.toml"
     file.write_text('q = [0.0, -1.5, 1.5, 0.0, 0.0, 0.0]\nshaper = "ei"\n')
     made = config(ur=True, state=str(file)).setup()
     assert (made.q, made.shaper, made.payload.mass) == ((0.0, -1.5, 1.5, 0.0, 0.0, 0.0), "ei", 0.0)
 
 
-def test_an_arm_that_is_not_of_ur_s_form_starts_in_its_own_posture():
+def test_an_arm_without_ur_geometry_starts_in_its_own_posture():
     made = from_mapping({"robot": "one-joint", "ur": True}, "tvist.toml").setup()
     assert made.q == load("one-joint").poses["Q1"]
     assert made.payload.mass == 0.0

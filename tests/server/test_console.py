@@ -1,4 +1,4 @@
-"""Stops and warnings stand on the server's console, a line each, and a flood of them does not flood it."""
+"""The console logs stops and warnings, one line each and a limited number."""
 
 import logging
 import threading
@@ -31,7 +31,7 @@ def publish(console, *events):
         gateway.publish("event", event, b"")
 
 
-def test_stops_and_warnings_are_lines_with_what_to_do_and_what_is_everyday_is_not_told(said):
+def test_only_stops_and_warnings_are_logged_with_the_next_step(said):
     console = Console()
     publish(console, *(Event(tick=7, kind=kind, why=kind) for kind in EVENT_MEANINGS))
     lines = said(console)
@@ -39,7 +39,7 @@ def test_stops_and_warnings_are_lines_with_what_to_do_and_what_is_everyday_is_no
     assert "left: protective stop at tick 7: protective_stop. Next: tvist unlock --name left" in lines
 
 
-def test_a_flood_is_cut_off_and_counted_and_warnings_take_no_room_of_stops(said):
+def test_lines_are_limited_and_counted_separately_for_stops_and_warnings(said):
     console = Console()
     publish(console, *[Event(tick=1, kind="warning", why="doubt")] * 100, *[STOP] * 1000)
     lines = said(console)
@@ -49,7 +49,7 @@ def test_a_flood_is_cut_off_and_counted_and_warnings_take_no_room_of_stops(said)
     assert any(f"{100 - WARNINGS} more warnings" in line for line in lines)
 
 
-def test_after_a_while_lines_come_through_again_behind_the_count_of_those_left_out():
+def test_the_limit_of_lines_ends_with_its_window():
     throttle = Throttle(2, "stops")
     assert [throttle.take(str(n), 0.0) for n in range(4)] == [["0"], ["1"], [], []]
     assert throttle.due(WINDOW - 0.1) == []
@@ -59,7 +59,7 @@ def test_after_a_while_lines_come_through_again_behind_the_count_of_those_left_o
     assert throttle.take("5", WINDOW + 0.1) == ["5"]
 
 
-def test_a_console_that_nobody_reads_holds_up_neither_the_robot_nor_the_end(monkeypatch):
+def test_a_blocked_console_delays_neither_the_robot_nor_the_shutdown(monkeypatch):
     stuck = threading.Event()
     monkeypatch.setattr("tvist_server.gateways.console.log.warning", lambda *_: stuck.wait(60.0))
     console = Console()

@@ -1,4 +1,4 @@
-"""The program that follows set-points: on the path on a good link, smooth on a bad one, at rest without one."""
+"""The program that follows set-points: exact on a good link, smooth on a bad one, at rest without one."""
 
 import re
 
@@ -225,7 +225,7 @@ def followed(path, arrivals, count, kind=Alone, **changes):
     return robot, begun + max(tick for tick, come in enumerate(arrivals) if come)
 
 
-def test_the_program_is_correct_and_calls_documented_functions_alone():
+def test_the_program_compiles_and_calls_only_documented_functions():
     text = program(1, **GIVEN)
     assert check_program(text) == []
     code = re.sub(r"#.*", "", text)
@@ -235,15 +235,14 @@ def test_the_program_is_correct_and_calls_documented_functions_alone():
 
 
 @pytest.mark.parametrize(
-    ("name", "value"),
-    [("run", 0), ("run", 2**31), ("speed", 0.0), ("deceleration", float("nan"))],
+    ("name", "value"), [("run", 0), ("run", 2**31), ("speed", 0.0), ("deceleration", float("nan"))]
 )
-def test_what_a_robot_would_not_take_is_refused(name, value):
+def test_invalid_parameters_of_the_program_are_refused(name, value):
     with pytest.raises(ValueError, match=f"^{name} is .*: must be"):
         program(**{"run": 1, **GIVEN, name: value})
 
 
-def test_numbers_that_begin_anew_change_nothing():
+def test_the_wrap_of_set_point_numbers_changes_nothing():
     arrivals = late(np.random.default_rng(1), 200, jitter=1.4, stalls=0.02, longest=6)
     runs = Alone(), Alone()
     for robot, before in zip(runs, (0, r.MAX_NUMBER - 100), strict=True):
@@ -255,7 +254,7 @@ def test_numbers_that_begin_anew_change_nothing():
 
 @examples(20)
 @given(seed=st.integers(0, 2**31), speed=st.floats(0.05, 3.0), jitter=st.floats(0.0, 0.99))
-def test_on_a_good_link_it_plays_every_set_point_as_it_is(seed, speed, jitter):
+def test_on_a_good_link_every_set_point_is_played_exactly(seed, speed, jitter):
     """Packages that come up to a period late or early at random are waited for by one period."""
     path = swings(600, 0.99 * speed)
     arrivals = late(np.random.default_rng(seed), 560, base=1.0, jitter=jitter / 2)
@@ -269,7 +268,7 @@ def test_on_a_good_link_it_plays_every_set_point_as_it_is(seed, speed, jitter):
 
 @examples(30)
 @given(seed=st.integers(0, 2**31), speed=st.floats(0.1, 2.5))
-def test_a_bad_link_shows_by_smooth_detours_that_fade(seed, speed):
+def test_on_a_bad_link_deviations_are_smooth_and_decay(seed, speed):
     """Packages late by up to 12 periods and then at once, some twice, some never."""
     random, count = np.random.default_rng(seed), 400
     jitter, stalls, repeated, left_out = random.uniform(0.0, [2.0, 0.05, 0.3, 0.05])
@@ -308,7 +307,7 @@ def garbled(random, package, wildness):
 
 @examples(30)
 @given(seed=st.integers(0, 2**31), speed=st.floats(0.1, 3.0), wildness=st.sampled_from([1e-3, 0.1, 5.0]))
-def test_whatever_comes_it_moves_within_its_limits_and_ends_at_rest(seed, speed, wildness):
+def test_garbled_packages_never_exceed_the_limits_and_the_arm_ends_at_rest(seed, speed, wildness):
     """Every fourth time on a whole robot."""
     random, count = np.random.default_rng(seed), 300
     path = swings(count, 0.9 * speed)
@@ -329,7 +328,7 @@ def test_whatever_comes_it_moves_within_its_limits_and_ends_at_rest(seed, speed,
 
 
 @pytest.mark.parametrize(("speed", "moment"), [(3.0, 3), (0.2, 201), (3.0, 305)])
-def test_it_brakes_within_40_ms_of_the_last_set_point(speed, moment):
+def test_the_program_brakes_within_40_ms_of_the_last_set_point(speed, moment):
     path = swings(400, speed)
     robot, last = followed(
         path, [[k] for k in range(moment)], moment, OnRobot, speed=speed, deceleration=20.0
@@ -352,7 +351,7 @@ LATE = (
 
 
 @pytest.mark.parametrize(("speed", "share"), [(0.05, 0.97), (2.5, 1.0)])
-def test_joints_at_their_largest_speed_fall_behind_no_further_once_a_bad_link_is_good(speed, share):
+def test_joints_at_the_speed_limit_catch_up_after_a_bad_link(speed, share):
     """On a robot of 125 Hz; neither do they stay behind, since the program may be faster than the set-points."""
     count, step = 400, 0.008
     speeds = np.clip((np.arange(count) - 8) * step * 40.0 * speed, 0.0, share * speed)
@@ -367,7 +366,7 @@ def test_joints_at_their_largest_speed_fall_behind_no_further_once_a_bad_link_is
 
 
 @pytest.mark.parametrize("lost", [3, 17])
-def test_a_sender_that_has_lost_periods_for_good_is_followed_later_by_as_many(lost):
+def test_lost_periods_shift_the_motion_in_time(lost):
     path = swings(1000, 0.45)
     robot, _ = followed(path, [[k] for k in range(200)], 600)
     robot.play(packages(path, 600), [*([] for _ in range(lost)), *([200 + k] for k in range(400))])
@@ -393,7 +392,7 @@ def test_a_sender_that_has_lost_periods_for_good_is_followed_later_by_as_many(lo
         ],
     ],
 )
-def test_a_wrong_package_ends_it_and_it_says_why(come, change, why):
+def test_an_invalid_package_ends_the_program_with_its_reason(come, change, why):
     """After a gap it plays the set-point before the newest, and reads the one before that for the velocity."""
     path = swings(300, 0.4)
     robot, _ = followed(path, [[k] for k in range(150)], 300)
@@ -410,7 +409,7 @@ def test_a_wrong_package_ends_it_and_it_says_why(come, change, why):
 
 
 @pytest.mark.parametrize("away", [0.0099, -0.0101])
-def test_the_first_set_point_may_be_a_hundredth_of_a_radian_away(away):
+def test_the_first_set_point_may_be_at_most_10_mrad_away(away):
     path = np.tile(HERE, (600, 1))
     path[:, 2] += away
     robot, last = followed(path, [[k] for k in range(500)], 500)
@@ -426,7 +425,7 @@ def test_the_first_set_point_may_be_a_hundredth_of_a_radian_away(away):
 
 @pytest.mark.parametrize("number", [0, 1])
 @pytest.mark.parametrize("waits", [0, 50])
-def test_a_program_that_waits_is_ended_at_once(number, waits):
+def test_a_waiting_program_ends_on_request(number, waits):
     """Else the robot would take no program for as long as it waits."""
     package = (number, -RUN, *(4 * tuple(HERE)))
     robot = Alone(before=None if waits else package)
@@ -438,7 +437,7 @@ def test_a_program_that_waits_is_ended_at_once(number, waits):
     assert not robot.told
 
 
-def test_registers_of_before_move_nothing():
+def test_old_registers_start_no_motion():
     robot = Alone(before=packages(swings(600, 0.4), 400)[-1])
     robot.steps(1000)
     assert robot.state is r.ProgramState.WAITING
@@ -449,7 +448,7 @@ def test_registers_of_before_move_nothing():
 
 
 @pytest.mark.parametrize(("lag", "why"), [(40, None), (120, r.ProgramEnded.STRAYED)])
-def test_an_arm_that_does_not_follow_ends_it(lag, why):
+def test_the_program_ends_if_the_arm_does_not_follow(lag, why):
     path = swings(400, 0.45)
     robot, _ = followed(path, [[k] for k in range(300)], 300, lag=lag)
     assert robot.state is (r.ProgramState.ENDED if why else r.ProgramState.FOLLOWING)
@@ -457,7 +456,7 @@ def test_an_arm_that_does_not_follow_ends_it(lag, why):
 
 
 @pytest.mark.parametrize(("how", "periods", "moment"), [("pause", 25, 90), ("stop", 25, 160)])
-def test_it_does_not_go_on_after_a_pause(how, periods, moment):
+def test_the_program_ends_after_a_pause(how, periods, moment):
     """Of more than 40 ms, also if the sender goes on meanwhile: what has come counts no more."""
     path = swings(1500, 0.45)
     sent = packages(path, 1400)

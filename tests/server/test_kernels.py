@@ -1,4 +1,4 @@
-"""Compiling ahead: which kernels, how far it is, and that it leaves nothing behind."""
+"""Compiling ahead: all needed kernels are compiled, and no process is left behind."""
 
 import subprocess
 import sys
@@ -71,17 +71,17 @@ def begun(monkeypatch):
 
     monkeypatch.setattr(kernels, "PARTS", programs)
     monkeypatch.setattr(kernels, "_begin", begin)
-    monkeypatch.setattr(kernels, "LOOK", 0.0)
+    monkeypatch.setattr(kernels, "CHECK_EVERY", 0.0)
     return programs, started
 
 
-def test_a_failure_is_told_in_one_sentence(begun):
+def test_the_error_of_a_compiling_process_is_reported(begun):
     begun[0].update(a="pass", b="raise SystemExit(3)", c="print('noise'); raise SystemExit('no room')")
     with pytest.raises(kernels.KernelsError, match=r"^no room$"):
         kernels.compile_ahead(1)
 
 
-def test_a_signal_ends_the_processes_that_compile(begun):
+def test_a_signal_ends_the_compiling_processes(begun):
     begun[0].update(a=SLEEP, b=SLEEP)
 
     def interrupt(*_):
@@ -101,9 +101,7 @@ def test_a_served_robot_loads_no_kernel_while_it_ticks(tmp_path):
 
 
 @pytest.mark.nightly
-def test_a_robot_with_all_its_motions_and_shapers_compiles_nothing_that_is_not_compiled_ahead(
-    tmp_path, monkeypatch
-):
+def test_all_kernels_that_a_robot_needs_are_compiled_ahead(tmp_path, monkeypatch):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     subprocess.run([sys.executable, "-m", "tvist_cli", "serve", "--compile"], check=True)
     ahead = sorted(tmp_path.rglob("*.kernel"))

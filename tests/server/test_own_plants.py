@@ -1,4 +1,4 @@
-"""Plants of one's own and hidden robots: found, made for a robot, kept in a recording by name or seed, and replayed."""
+"""Own plants and hidden robots: loaded, made for a robot, recorded by name or seed, and replayed."""
 
 import pickle
 from pathlib import Path
@@ -60,7 +60,7 @@ def place(tmp_path):
     return f"{file}:Echo"
 
 
-def test_an_installed_one_is_found_by_its_name():
+def test_an_installed_plant_is_found_by_name():
     made = load_plant("mujoco").make(UR5E, body(setup().payload))
     assert type(made).__name__ == MujocoArm.__name__
     with pytest.raises(OwnFileError, match=r"must be FILE\.py:NAME, or one of calibrated, .*mujoco"):
@@ -75,14 +75,14 @@ def test_an_installed_one_is_found_by_its_name():
         ("leaves", "making it raises SystemExit: 3"),
     ],
 )
-def test_one_that_cannot_be_made_says_why(place, name, said):
+def test_a_plant_that_cannot_be_made_is_refused_with_the_reason(place, name, said):
     plant = load_plant(place.replace("Echo", name))
     with pytest.raises(OwnFileError, match=said):
         plant.make(UR5E, UR5E.payload)
 
 
 @pytest.mark.parametrize("kind", ["import", "make"])
-def test_a_signal_that_ends_the_process_meanwhile_is_no_fault_of_its_file(tmp_path, kind):
+def test_a_signal_while_a_plant_loads_ends_the_process(tmp_path, kind):
     file = tmp_path / "slow.py"
     text = "from tvist_server.shutdown import SignalExit\ndef make(*_): raise SignalExit(0)\n"
     file.write_text(text + ("make(0, 0)\n" if kind == "import" else ""))
@@ -90,7 +90,7 @@ def test_a_signal_that_ends_the_process_meanwhile_is_no_fault_of_its_file(tmp_pa
         load_plant(f"{file}:make").make(UR5E, UR5E.payload)
 
 
-def test_a_configuration_names_it_and_a_worker_finds_it_again(place):
+def test_a_plant_is_pickled_by_reference_to_its_unchanged_file(place):
     made = ServeConfig(plant=place).setup()
     assert pickle.loads(pickle.dumps(made.plant)) == made.plant  # noqa: S301  our own
     file = Path(place.rsplit(":", 1)[0])
@@ -115,7 +115,7 @@ def moved(chosen, path, ticks=300):
     return read(path)
 
 
-def test_a_setup_survives_its_recording_and_a_run_its_replay(tmp_path, place):
+def test_a_run_with_an_own_plant_is_recorded_and_replayed(tmp_path, place):
     own = load_plant(place)
     content = moved(setup(plant=own), tmp_path / "run.mcap")
     assert content.start["plant"] == {"place": place, "sha256": own.sha256}
@@ -131,17 +131,17 @@ def test_a_setup_survives_its_recording_and_a_run_its_replay(tmp_path, place):
         load_plant(real)
 
 
-def test_only_the_process_that_serves_it_makes_it():
+def test_a_rehearsal_does_not_make_the_plant():
     _rehearse(setup(plant=OwnPlant("real.py:Arm", "", lambda *_: pytest.fail("it was touched"))))
 
 
-def test_a_plant_is_not_taken_where_there_was_none(tmp_path, place):
+def test_a_replay_refuses_a_plant_that_was_not_served(tmp_path, place):
     content = moved(setup(), tmp_path / "run.mcap", 10)
     with pytest.raises(ReplayError, match="was served without the plant"):
         replay_file(content, plant=load_plant(place))
 
 
-def test_ticks_of_an_arm_are_late_by_what_they_exceed_a_period_and_missed_where_it_left_some_out():
+def test_ticks_of_an_arm_are_late_or_missed_by_their_distance():
     followed, found, now = ExternalTicks(0.002, 5.0), [], 5.0
     for gap in (0.002, 0.0025, 0.0015, 0.0071):
         now += gap
@@ -155,7 +155,7 @@ SEED = 314159
 """Of a hidden robot."""
 
 
-def test_a_hidden_robot_replays_to_the_last_bit_and_only_its_seed_tells_of_it(tmp_path):
+def test_a_hidden_robot_replays_exactly_and_publishes_no_hidden_value(tmp_path):
     """Recorded setup and published info are those of the file, and no value that was drawn is in them or in a state."""
     found = moved(setup(hidden=SEED), tmp_path / "hidden.mcap")
     again = replay_file(found)
@@ -174,7 +174,7 @@ def test_a_hidden_robot_replays_to_the_last_bit_and_only_its_seed_tells_of_it(tm
     assert not [value for value in secrets if f"{value!r}"[:9] in told]
 
 
-def test_its_plant_has_no_ability_that_would_tell():
+def test_the_plant_of_a_hidden_robot_reveals_nothing():
     plant = setup(hidden=SEED).made_plant()
     for ability in (Plant.truth, Plant.modes, Plant.held):
         assert not plant.can(ability)
@@ -182,12 +182,12 @@ def test_its_plant_has_no_ability_that_would_tell():
 
 
 @pytest.mark.parametrize("given", [{"truth": True}, {"plant": load_plant("stribeck")}])
-def test_what_would_tell_is_refused(given):
+def test_options_that_would_reveal_a_hidden_robot_are_refused(given):
     with pytest.raises(ValueError, match=f"hidden is {SEED}, but .*: leave one of them out"):
         setup(hidden=SEED, **given).check()
 
 
-def test_several_hidden_robots_are_different_ones():
+def test_each_hidden_robot_has_its_own_seed():
     config = ServeConfig(robots="ur5e*2", hidden=5)
     assert [one.hidden for one in config.setups()] == [5, 6]
     assert free_setup(hidden=5, truth=False).hidden == 5

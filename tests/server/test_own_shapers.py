@@ -89,13 +89,13 @@ def file(tmp_path):
     return path
 
 
-def test_a_function_an_object_and_a_filter_go_by_their_own_names(file):
+def test_a_shaper_is_named_after_its_function_object_or_filter(file):
     for name, called in (("mine", "mine"), ("thirds", "thirds"), ("MEAN", "mean")):
         own = load_own(f"{file}:{name}")
         assert (own.name, own.file, own.attribute) == (called, str(file), name)
 
 
-def test_what_is_no_shaper_is_said_with_its_file_and_line(file):
+def test_an_invalid_shaper_is_refused_with_file_and_line(file):
     for content, name, said in WRONG:
         file.write_text(content, encoding="utf-8")
         with pytest.raises(OwnFileError, match=r"^shaper ") as error:
@@ -105,7 +105,7 @@ def test_what_is_no_shaper_is_said_with_its_file_and_line(file):
         assert "\n" not in str(error.value)
 
 
-def test_a_file_that_is_none_is_said(tmp_path):
+def test_a_missing_shaper_file_is_refused(tmp_path):
     for place, said in (
         (f"{tmp_path}/no.py:mine", r"no\.py cannot be read: No such file"),
         ("zv", r"FILE\.py:NAME"),
@@ -114,7 +114,7 @@ def test_a_file_that_is_none_is_said(tmp_path):
             load_own(place)
 
 
-def test_it_travels_to_another_process_as_a_file_that_must_not_have_changed(file):
+def test_a_shaper_is_pickled_by_reference_to_its_file(file):
     own = load_own(f"{file}:mine")
     data = pickle.dumps(own)
     assert pickle.loads(data) == own  # noqa: S301  it is ours
@@ -134,7 +134,7 @@ def test_it_travels_to_another_process_as_a_file_that_must_not_have_changed(file
         ("damped", "one-joint", None),
     ],
 )
-def test_it_has_to_work_for_the_modes_of_the_arm_and_for_no_others(file, name, robot, said):
+def test_a_shaper_must_support_the_modes_of_the_arm(file, name, robot, said):
     config = from_mapping({"shaper": f"{file}:{name}", "robot": robot}, "configuration")
     if said is None:
         made = config.setup()
@@ -147,7 +147,7 @@ def test_it_has_to_work_for_the_modes_of_the_arm_and_for_no_others(file, name, r
     assert said in str(error.value)
 
 
-def test_a_state_file_takes_one_beside_another_and_two_of_one_name_are_refused(file, tmp_path):
+def test_a_state_file_can_add_a_shaper_with_another_name(file, tmp_path):
     path = tmp_path / "state.toml"
     path.write_text(f'shaper = "{file}:MEAN"\n')
     config = from_mapping({"shaper": f"{file}:mine", "state": str(path)}, "configuration")
@@ -159,7 +159,7 @@ def test_a_state_file_takes_one_beside_another_and_two_of_one_name_are_refused(f
         config.setup()
 
 
-def test_one_that_lasts_too_long_for_this_robot_does_not_start(file):
+def test_a_shaper_longer_than_the_largest_delay_is_refused(file):
     with pytest.raises(ValueError, match=r"at most max_delay = 1 s; shaper 'long' lasts 9 periods"):
         Robot(calibration=calibration(), shaper="long", own_shapers=(load_own(f"{file}:LONG"),))
 
@@ -174,27 +174,27 @@ def robot(mine, **changes):
     return Robot(**({"calibration": calibration(), "shaper": given.name, "own_shapers": (given,)} | changes))
 
 
-class TestOnARobot:
-    def test_states_are_those_of_the_shaper_it_imitates_to_the_last_bit(self):
-        mine, built_in = (
-            robot(Shaper("mine", "as zv", zv, 0.5)),
-            Robot(calibration=calibration(), shaper="zv"),
-        )
-        for one in (mine, built_in):
-            one.send(c.MoveJ, q=tuple(Q2))
-            one.until_rest()
-        assert mine.states == built_in.states
-        assert info_of(mine.controller).shaper == "mine"
+def test_an_own_zv_shaper_gives_the_states_of_the_built_in_one():
+    mine, built_in = (
+        robot(Shaper("mine", "as zv", zv, 0.5)),
+        Robot(calibration=calibration(), shaper="zv"),
+    )
+    for one in (mine, built_in):
+        one.send(c.MoveJ, q=tuple(Q2))
+        one.until_rest()
+    assert mine.states == built_in.states
+    assert info_of(mine.controller).shaper == "mine"
 
-    def test_a_client_chooses_it_by_its_name_and_names_no_file(self, file):
-        place = f"{file}:thirds"
-        one = Robot(calibration=calibration(), own_shapers=(load_own(place),))
-        assert info_of(one.controller).shapers[-1] == "thirds"
-        assert one.send(c.SetShaper, name="thirds") == Done()
-        for name in (f"{file}:mine"[-64:], "mine"):
-            for refused in (one.send(c.SetShaper, name=name), one.send(SimulationReset, shaper=name)):
-                assert refused.code == "unknown_shaper"
-        assert one.send(SimulationReset, shaper="thirds") == Done(tick=0)
+
+def test_clients_choose_an_own_shaper_by_name_and_never_by_file(file):
+    place = f"{file}:thirds"
+    one = Robot(calibration=calibration(), own_shapers=(load_own(place),))
+    assert info_of(one.controller).shapers[-1] == "thirds"
+    assert one.send(c.SetShaper, name="thirds") == Done()
+    for name in (f"{file}:mine"[-64:], "mine"):
+        for refused in (one.send(c.SetShaper, name=name), one.send(SimulationReset, shaper=name)):
+            assert refused.code == "unknown_shaper"
+    assert one.send(SimulationReset, shaper="thirds") == Done(tick=0)
 
 
 FAILING = {
@@ -244,46 +244,44 @@ EACH = [(name, (move, stream, fade, rest)[number % 4]) for number, name in enume
 """Every failure in some activity, and every activity."""
 
 
-class TestOneThatFails:
-    @pytest.mark.parametrize(("failing", "activity"), EACH, indirect=["failing"])
-    def test_the_robot_makes_a_protective_stop_that_names_it_and_goes_on_with_another(
-        self, failing, activity
-    ):
-        one, turning, words = failing
-        activity(one)
-        one.tick(100 if activity in {move, fade} else 0)
-        before = len(one.states)
-        turning.failing = True
-        one.tick(1)
-        (event,) = [event for event in one.events if event.kind == "protective_stop"]
-        assert event.tick == before + 1
-        assert event.why.startswith("shaper mine ")
-        assert words in event.why
-        assert "Hz and ζ = " in event.why
-        one.until_rest()
-        assert one.tick().safety_mode == SafetyMode.PROTECTIVE_STOP
-        assert np.abs(one.column("target_qdd")).max() < 50.0  # a stop at the torque limits, and no jump
-        assert np.abs(np.diff(one.column("target_q"), axis=0)).max() < 1.1 * PAPER.velocity * H
-        if activity is not fade:  # without another shaper it stops again
-            assert one.send(c.UnlockProtectiveStop) == Done()
-            assert one.tick().safety_mode == SafetyMode.PROTECTIVE_STOP
-            one.until_rest()
-        assert one.send(c.SetShaper, name="ei") == Done()
+@pytest.mark.parametrize(("failing", "activity"), EACH, indirect=["failing"])
+def test_a_failing_shaper_causes_a_protective_stop(failing, activity):
+    one, turning, words = failing
+    activity(one)
+    one.tick(100 if activity in {move, fade} else 0)
+    before = len(one.states)
+    turning.failing = True
+    one.tick(1)
+    (event,) = [event for event in one.events if event.kind == "protective_stop"]
+    assert event.tick == before + 1
+    assert event.why.startswith("shaper mine ")
+    assert words in event.why
+    assert "Hz and ζ = " in event.why
+    one.until_rest()
+    assert one.tick().safety_mode == SafetyMode.PROTECTIVE_STOP
+    assert np.abs(one.column("target_qdd")).max() < 50.0  # a stop at the torque limits, and no jump
+    assert np.abs(np.diff(one.column("target_q"), axis=0)).max() < 1.1 * PAPER.velocity * H
+    if activity is not fade:  # without another shaper it stops again
         assert one.send(c.UnlockProtectiveStop) == Done()
-        one.send(c.MoveJ, q=tuple(Q2))
+        assert one.tick().safety_mode == SafetyMode.PROTECTIVE_STOP
         one.until_rest()
-        assert one.kinds()[-1] == "motion_done"
+    assert one.send(c.SetShaper, name="ei") == Done()
+    assert one.send(c.UnlockProtectiveStop) == Done()
+    one.send(c.MoveJ, q=tuple(Q2))
+    one.until_rest()
+    assert one.kinds()[-1] == "motion_done"
 
-    def test_it_is_refused_with_the_reason_also_by_what_plans_beside_the_tick(self, failing):
-        one, turning, words = failing
-        assert one.send(c.SetShaper, name="zv") == Done()
-        turning.failing = True
-        refused = one.send(c.SetShaper, name="mine")
-        assert (refused.code, refused.where) == ("out_of_range", "name")
-        assert words in refused.why or "last" in refused.why
-        command = c.SetShaper(token=one.token, name="mine")
-        plan = Planner(one.controller.setup).plan(command, one.controller.snapshot())
-        assert words in plan.found.reply.why
+
+def test_a_failing_shaper_is_refused_also_by_the_planner(failing):
+    one, turning, words = failing
+    assert one.send(c.SetShaper, name="zv") == Done()
+    turning.failing = True
+    refused = one.send(c.SetShaper, name="mine")
+    assert (refused.code, refused.where) == ("out_of_range", "name")
+    assert words in refused.why or "last" in refused.why
+    command = c.SetShaper(token=one.token, name="mine")
+    plan = Planner(one.controller.setup).plan(command, one.controller.snapshot())
+    assert words in plan.found.reply.why
 
 
 @pytest.fixture
@@ -293,7 +291,7 @@ def recorded(file, tmp_path):
     return moved(setup(calibration=calibration(), shaper="mine", own_shapers=own), tmp_path / "run.mcap")
 
 
-def test_a_replay_with_the_file_wherever_it_is_is_equal_and_a_changed_one_is_noted(recorded, file, tmp_path):
+def test_a_replay_with_the_shaper_file_is_equal_and_notes_changes(recorded, file, tmp_path):
     (said,) = recorded.start["own_shapers"]
     own = load_own(f"{file}:mine")
     assert said == {"name": "mine", "file": str(file), "attribute": "mine", "sha256": own.sha256}
@@ -306,7 +304,7 @@ def test_a_replay_with_the_file_wherever_it_is_is_equal_and_a_changed_one_is_not
     assert "moved.py has changed since" in done.notes[0]
 
 
-def test_a_replay_without_the_file_says_which_is_missing_and_runs_nothing(recorded, file):
+def test_a_replay_without_the_shaper_file_is_refused(recorded, file):
     with pytest.raises(ReplayError, match="without the shaper mean"):
         replay_file(recorded, None, [load_own(f"{file}:{name}") for name in ("mine", "MEAN")])
     file.write_text("raise SystemExit('it was run')")
@@ -314,7 +312,7 @@ def test_a_replay_without_the_file_says_which_is_missing_and_runs_nothing(record
         replay_file(recorded)
 
 
-def test_a_start_that_holds_nonsense_is_said(recorded):
+def test_an_invalid_list_of_shapers_in_a_recording_is_refused(recorded):
     for said in (3, [3], [{"name": "mine"}], None):
         recorded.start["own_shapers"] = said
         with pytest.raises(ReplayError, match="own_shapers"):

@@ -1,4 +1,4 @@
-"""Plans made beside the controller's thread: the same outcome, in the same order."""
+"""Plans made beside the controller's thread have the same results in the same order."""
 
 import threading
 from collections import deque
@@ -26,14 +26,14 @@ LIGHT = {"mass": 2.0, "com": (0.0, 0.0, 0.04), "inertia": (0.002, 0.0, 0.0, 0.00
 class Served:
     """A robot whose controller's thread is the test's own: jobs run when it says."""
 
-    def __init__(self, complete=None, **changes):
+    def __init__(self, folder=None, **changes):
         start = setup(clock="realtime", **changes)
         self.sink = Kept()
         self.host = Host(Controller(start), self.sink)
         self.jobs, self.came = deque(), threading.Condition()
-        self.ahead = PlanAhead(self.host, Planner(start), self.post, complete)
+        self.ahead = PlanAhead(self.host, Planner(start), self.post, ProgramFolder(folder).complete)
         self.ahead.start()
-        self.reception = RobotIntake(self.host, self.post, self.ahead.submit)
+        self.intake = RobotIntake(self.host, self.post, self.ahead.submit)
         self.replies = []
         self.token = self.ask(c.TakeControl(client="anna", lease_s=3600.0)).token
 
@@ -43,7 +43,7 @@ class Served:
             self.came.notify()
 
     def send(self, command):
-        self.reception.request(encode(command), self.answer)
+        self.intake.request(encode(command), self.answer)
 
     def answer(self, reply):
         self.replies.append(reply)
@@ -94,7 +94,7 @@ def served():
     served.close()
 
 
-def test_what_was_planned_beside_is_what_the_controller_would_have_done(served):
+def test_a_plan_made_ahead_equals_one_made_in_the_tick(served):
     commands = [
         (c.SetShaper, {"name": "auto"}),
         (c.MoveJ, {"q": tuple(Q2.tolist())}),
@@ -110,10 +110,10 @@ def test_what_was_planned_beside_is_what_the_controller_would_have_done(served):
     assert [state.target_q for state in served.sink.states] == [state.target_q for state in alone.states]
 
 
-def test_a_program_of_the_folder_is_loaded_and_journaled_with_its_text(tmp_path):
+def test_a_program_of_the_folder_is_journaled_with_its_text(tmp_path):
     (tmp_path / "wait.script").write_text("sync()\n")
     (tmp_path / "bad.urp").write_bytes(b"\xff")
-    served = Served(ProgramFolder(tmp_path).complete)
+    served = Served(tmp_path)
     names = ("wait.urp", "bad.urp", "nothing.urp", "Q1.urp")
     replies = [served.ask(ProgramLoad(name=name)) for name in names]
     served.close()
@@ -123,7 +123,7 @@ def test_a_program_of_the_folder_is_loaded_and_journaled_with_its_text(tmp_path)
     assert {load["name"]: load.get("text") for load in loads} == {"wait.urp": "sync()\n", "Q1.urp": None}
 
 
-def test_a_motion_is_planned_anew_where_what_it_was_planned_on_has_changed(served):
+def test_an_outdated_plan_is_made_again(served):
     """The other payload comes from a client that the queue of the first does not know of."""
     move = served.of(c.MoveJ, q=tuple(Q3.tolist()))
     served.send(move)
@@ -144,7 +144,7 @@ def test_a_motion_is_planned_anew_where_what_it_was_planned_on_has_changed(serve
     assert served.host.controller.declared == Payload(**LIGHT)
 
 
-def test_one_client_s_commands_keep_their_order(served):
+def test_commands_of_one_client_keep_their_order(served):
     sent = [
         served.of(c.SetShaper, name="zvd"),
         served.of(c.KeepAlive),
@@ -172,7 +172,7 @@ def test_one_client_s_commands_keep_their_order(served):
 
 
 @pytest.mark.parametrize(("stop", "waiting"), [(c.Stop(), 0), (c.Stop(), 12), (ProgramStop(), 12)])
-def test_no_motion_that_was_sent_before_a_stop_outlives_it(served, waiting, stop):
+def test_a_stop_also_ends_motions_that_wait_to_be_planned(served, waiting, stop):
     """Also where something moved when both were sent, and the motion is planned when that has come to rest."""
     served.ask(served.of(c.MoveJ, q=(*Q2[:5].tolist(), 0.05)))
     served.tick(40)
@@ -187,13 +187,13 @@ def test_no_motion_that_was_sent_before_a_stop_outlives_it(served, waiting, stop
 
 
 @pytest.mark.parametrize("stop", [c.Stop(), ProgramStop()])
-def test_a_stop_of_what_moves_waits_for_no_plan_however_many_commands_wait(served, stop):
+def test_a_stop_does_not_wait_for_commands_that_are_planned(served, stop):
     served.ask(served.of(c.MoveJ, q=tuple(Q2.tolist())))
     served.tick(100)
     for _ in range(MAX_WAITING):
         served.send(served.of(c.SetShaper, name="auto"))
     replies = []
-    served.reception.request(encode(stop), replies.append)
+    served.intake.request(encode(stop), replies.append)
     served.empty()
     assert replies == [Done()]
     kinds = [entry.message["type"] for entry in served.sink.entries]
@@ -202,7 +202,7 @@ def test_a_stop_of_what_moves_waits_for_no_plan_however_many_commands_wait(serve
     )
 
 
-def test_who_sends_more_than_can_be_planned_is_told_so(served):
+def test_commands_beyond_the_queue_are_refused_as_busy(served):
     for _ in range(3 * MAX_WAITING):
         served.send(served.of(c.SetShaper, name="zv"))
     served.serve(1 + 3 * MAX_WAITING)
@@ -212,7 +212,7 @@ def test_who_sends_more_than_can_be_planned_is_told_so(served):
     assert served.ask(served.of(c.KeepAlive)) == Done()
 
 
-def test_nothing_that_a_stranger_sends_is_journaled_or_reaches_the_controller(served):
+def test_messages_without_control_do_not_reach_the_controller(served):
     before, jobs = len(served.sink.entries), len(served.jobs)
     strangers = [
         c.MoveJ(token="x", q=tuple(Q2.tolist())),
@@ -222,38 +222,38 @@ def test_nothing_that_a_stranger_sends_is_journaled_or_reaches_the_controller(se
     ]
     for command in strangers:
         served.send(command)
-    served.reception.request(b"\xc1", served.answer)
-    served.reception.setpoint(encode(c.Setpoint(token="x", sequence=0, q=tuple(Q2.tolist()))))
+    served.intake.request(b"\xc1", served.answer)
+    served.intake.setpoint(encode(c.Setpoint(token="x", sequence=0, q=tuple(Q2.tolist()))))
     assert [type(reply) for reply in served.replies[1:]] == [Refused] * 5
     assert (len(served.sink.entries), len(served.jobs)) == (before, jobs)
-    assert (served.reception.commands_refused, served.reception.setpoints_refused) == (5, 1)
+    assert (served.intake.commands_refused, served.intake.setpoints_refused) == (5, 1)
 
 
-def test_control_that_is_granted_to_one_who_has_gone_ends_at_once(served):
+def test_control_granted_to_a_disconnected_client_ends_at_once(served):
     served.ask(served.of(c.ReleaseControl))
-    served.reception.client_seen("bert", "1f")
+    served.intake.client_seen("bert", "1f")
     served.send(c.TakeControl(client="bert"))
-    served.reception.client_gone("bert", "1f")
+    served.intake.client_gone("bert", "1f")
     served.serve(len(served.replies) + 1)
     while served.jobs:
         served.jobs.popleft()()
     assert served.host.standing.lease is None
 
 
-def test_copies_of_a_name_are_not_given_control_and_do_not_keep_it_alive(served):
+def test_a_second_session_of_a_client_neither_gets_nor_keeps_control(served):
     served.ask(served.of(c.ReleaseControl))
-    served.reception.client_seen("bert", "1f")
+    served.intake.client_seen("bert", "1f")
     assert isinstance(served.ask(c.TakeControl(client="bert")), Accepted)
-    served.reception.client_seen("bert", "2f")
+    served.intake.client_seen("bert", "2f")
     assert served.ask(c.TakeControl(client="bert")).code == "no_control"
-    served.reception.session_gone("1f")
+    served.intake.session_gone("1f")
     while served.jobs:
         served.jobs.popleft()()
     assert served.host.standing.lease is None
     assert isinstance(served.ask(c.TakeControl(client="bert")), Accepted), "one of that name is left"
 
 
-def test_the_command_that_broke_the_controller_is_in_the_journal(served, monkeypatch):
+def test_a_command_that_raises_is_in_the_journal(served, monkeypatch):
     def broken(*_):
         raise ZeroDivisionError
 
@@ -264,7 +264,7 @@ def test_the_command_that_broke_the_controller_is_in_the_journal(served, monkeyp
     assert served.sink.entries[-1].message["type"] == "keep_alive"
 
 
-def test_a_plan_that_fails_is_a_refusal_and_the_next_one_is_made(served, monkeypatch, caplog):
+def test_a_failed_plan_is_refused_and_the_next_command_is_planned(served, monkeypatch, caplog):
     planner = served.ahead._planner
     with monkeypatch.context() as patch:
         patch.setattr(planner, "plan", lambda *_: 1 / 0)

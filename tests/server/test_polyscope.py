@@ -1,4 +1,4 @@
-"""Programs that PolyScope saved: the URScript of each kind of node, and what is refused."""
+"""Programs saved by PolyScope: the URScript of each kind of node, and refused nodes."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from tvist_server.polyscope.contributed import EXTERNAL_CONTROL
 from tvist_server.polyscope.files import read_program, text_of
 from tvist_server.polyscope.positions import tool_pose
 from tvist_server.polyscope.references import References
-from tvist_server.polyscope.script import program, with_external_control
+from tvist_server.polyscope.script import program_text, with_external_control
 
 Q = (-1.5, -1.6, -2.2, -0.8, 1.6, 0.0)
 GRIPPER = "com.robotiq.urcap.gripper."
@@ -74,11 +74,11 @@ def lines(tmp_path):
          ['$ 2 "Gripper Activate"', "rq_activate_and_wait()"]),
     ],
 )  # fmt: skip
-def test_a_node_becomes_what_polyscope_writes_for_it(lines, node, script):
+def test_a_node_is_translated_to_the_script_that_polyscope_writes(lines, node, script):
     assert lines(node) == ['$ 1 "Robot Program"', *script]
 
 
-def test_branches_end_once(lines):
+def test_if_elseif_and_else_become_one_block(lines):
     branches = "".join(
         f"<If type='{kind}'>{expression('True') if kind != 'Else' else expression('')}<children/></If>"
         for kind in ("If", "ElseIf", "Else")
@@ -88,7 +88,7 @@ def test_branches_end_once(lines):
     ]  # fmt: skip
 
 
-def test_a_grip_check_asks_whether_the_gripper_holds_something(lines):
+def test_a_grip_check_becomes_an_if_on_object_detection(lines):
     held = contributed(f"{GRIPPER}gripper_validation_if_node", "If", "<Halt/>")
     other = contributed(f"{GRIPPER}gripper_validation_else_node", "Else", "<Halt/>")
     check = contributed(
@@ -112,7 +112,7 @@ KINEMATICS = "".join(
 KNOWN = f"<TCPOffset pose='0, 0, 0.1, 0, 0, 0'/><Kinematics>{KINEMATICS}</Kinematics>"
 
 
-def test_a_taught_waypoint_is_a_pose_by_the_kinematics_in_the_file_and_the_posture_near_it(lines):
+def test_a_taught_waypoint_becomes_a_pose_and_a_posture_near_it(lines):
     text = lines(
         move(waypoint("A 1", Q, kinematics=KNOWN)), move(waypoint("A 1", Q, kinematics=KNOWN), kind="MoveL")
     )
@@ -138,12 +138,12 @@ def test_a_taught_waypoint_is_a_pose_by_the_kinematics_in_the_file_and_the_postu
               kind="MoveP", blendRadius=0.02), "movec(A_q, A_q, a=2.0, v=1.5, r=0.0, mode=1)"),
     ],
 )  # fmt: skip
-def test_moves_have_the_speeds_of_their_node_or_of_the_waypoint(lines, node, script):
+def test_moves_have_the_speeds_of_their_node_or_waypoint(lines, node, script):
     set_up = f"<Assignment><variable name='x'/>{expression('p[0,0,0,0,0,0]')}</Assignment>"
     assert script in lines(set_up, node)
 
 
-def test_a_direction_is_a_thread_that_the_first_fulfilled_condition_ends(lines):
+def test_a_direction_becomes_a_thread_with_its_until_conditions(lines):
     ends = (
         "<Until type='TOOL_CONTACT_DETECTION' retraction='0.002'/>"
         "<Until type='IO' digitalValue='true'><pin referencedName='digital_in[1]'/></Until>"
@@ -162,7 +162,7 @@ def test_a_direction_is_a_thread_that_the_first_fulfilled_condition_ends(lines):
     assert places == sorted(places)
 
 
-def test_sub_programs_threads_and_initial_values_come_first(lines):
+def test_sub_programs_threads_and_initial_values_precede_the_program(lines):
     inner = "<subprogram name='pick'><children><Halt/></children></subprogram>"
     call = f"<CallSubProgram>{inner}</CallSubProgram>"
     listed = "<SubProgram reference='../MainProgram/children/CallSubProgram/subprogram'/>"
@@ -190,7 +190,7 @@ INSTALLATION = """<Installation>
 </Installation>"""
 
 
-def test_the_installation_beside_the_file_gives_tcp_payload_signals_features_and_variables(tmp_path):
+def test_the_installation_gives_tcp_payload_signals_features_and_variables(tmp_path):
     lamp = "<Set type='DigitalOutput'><pin referencedName='lamp'/><digitalValue>1</digitalValue></Set>"
     own = move(waypoint("A", Q), useActiveTCP="false", inside="<tcp referencedName='hook'/>")
     (tmp_path / "p.urp").write_text(saved(lamp, own))
@@ -229,7 +229,7 @@ def test_the_installation_beside_the_file_gives_tcp_payload_signals_features_and
         (move(waypoint("A", Q), kind="MoveP", blendRadius="wide"), "Move with could not convert"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_simulated_is_listed_once(lines, node, what):
+def test_nodes_that_cannot_be_simulated_are_listed_once(lines, node, what):
     with pytest.raises(
         UserFileError, match=f"PolyScope saved it with {what}[^,]*, which cannot be simulated"
     ):
@@ -245,18 +245,19 @@ def test_nodes_of_a_urcap_are_left_out_on_request(lines):
 SENT = "# HEADER_BEGIN\ndef step():\n  sync()\nend\n# HEADER_END\nstep()\n# NODE_CONTROL_LOOP_ENDS\n"
 
 
-def test_a_client_s_text_replaces_external_control_and_its_header_comes_first(lines, tmp_path):
+def test_the_clients_text_replaces_the_external_control_node(lines, tmp_path):
     node = contributed("com.fzi.externalcontrol.ExternalControlNode", "External Control", name="ext")
     assert EXTERNAL_CONTROL in lines(node)
     text = text_of(tmp_path / "p.urp", saved(node, "<Halt/>", repeats=True).encode())
     whole = with_external_control(text, SENT)
     assert whole.index("def step") < whole.index("step()\n") < whole.index("halt")
     assert (
-        with_external_control(program("a", EXTERNAL_CONTROL), "sync()\n") == "def a():\n\n  sync()\n\nend\n"
+        with_external_control(program_text("a", EXTERNAL_CONTROL), "sync()\n")
+        == "def a():\n\n  sync()\n\nend\n"
     )
 
 
-def test_a_program_that_repeats_definitions_alone_ends(lines):
+def test_a_program_that_only_defines_functions_does_not_repeat(lines):
     node = "<Script type='File'><cachedContents>def step():\n  sync()\nend</cachedContents></Script>"
     assert "while (True):" not in lines(node, repeats=True)
     assert "while (True):" in lines(node, "<Wait type='Sleep'><waitTime>1</waitTime></Wait>", repeats=True)
@@ -266,7 +267,7 @@ def test_a_program_that_repeats_definitions_alone_ends(lines):
     ("hops", "place", "found"),
     [(90, "h[{}]", True), (200, "h[{}]", False), (1, f"h[{'9' * 5000}]", False), (1, "x/../" * 300 + "h[{}]", False)],
 )  # fmt: skip
-def test_references_are_followed_but_not_without_end(hops, place, found):
+def test_references_are_followed_up_to_a_limit(hops, place, found):
     chain = "".join(f"<h><v reference='../../{place.format(hop)}/v'/></h>" for hop in range(2, hops + 2))
     root = xml(f"<root>{chain}<h><v name='a'/></h></root>".encode())
     target = References(root).target(root.find("./h/v"))

@@ -1,4 +1,4 @@
-"""The folder of programs: which file a name finds, what it has to contain, and what the robot gets of it."""
+"""The folder of programs: files found by name, their valid content, and what the robot gets of them."""
 
 import gzip
 
@@ -13,8 +13,6 @@ from tvist_protocol.codec import decode
 from tvist_protocol.info import Info
 from tvist_protocol.programs import MAX_SCRIPT, ProgramLoad, ProgramStop
 from tvist_protocol.replies import Refused
-from tvist_server.config import from_mapping
-from tvist_server.option_values import StartError
 from tvist_server.program_folder import ProgramFolder
 
 TEXT = "def pick():\n  sync()\nend\n"
@@ -32,7 +30,7 @@ def admitted(command):
     return Admitted(command, msgspec.to_builtins(command))
 
 
-def test_a_name_finds_its_file_and_the_name_of_a_saved_program_its_script(folder):
+def test_programs_are_found_by_file_name(folder):
     assert folder.names() == ["pick.script", "place.urp"]
     assert folder.read("pick.script") == folder.read("pick.urp") == folder.read("/programs/pick.urp") == TEXT
     assert folder.read("place.urp") == "textmsg(1)\n"
@@ -58,7 +56,7 @@ def test_a_name_finds_its_file_and_the_name_of_a_saved_program_its_script(folder
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
-def test_a_file_that_cannot_be_played_is_refused_with_the_reason(folder, content, why):
+def test_an_invalid_program_file_is_refused_with_the_reason(folder, content, why):
     (folder.path / "bad.urp").write_bytes(content)
     with pytest.raises(UserFileError, match=why):
         folder.read("bad.urp")
@@ -67,7 +65,7 @@ def test_a_file_that_cannot_be_played_is_refused_with_the_reason(folder, content
     assert refused.where == "name"
 
 
-def test_a_load_gets_the_text_of_the_file_and_other_commands_stay_as_they_are(folder):
+def test_only_a_load_command_gets_the_text_of_the_file(folder):
     completed = folder.complete(admitted(ProgramLoad(name="pick.urp")))
     assert completed.command == ProgramLoad(name="pick.urp", text=TEXT)
     assert completed.content["text"] == TEXT
@@ -75,7 +73,7 @@ def test_a_load_gets_the_text_of_the_file_and_other_commands_stay_as_they_are(fo
         assert folder.complete(admitted(command)).command is command
 
 
-def test_the_files_are_programs_of_the_robot_s_description(folder):
+def test_info_lists_the_programs_of_the_folder(folder):
     host = Host(Robot().controller)
     programs = decode(Info, folder.listed(host.info())).programs
     assert {"pick.script", "place.urp", "Q1.urp"} <= set(programs)
@@ -83,14 +81,7 @@ def test_the_files_are_programs_of_the_robot_s_description(folder):
     assert decode(Info, folder.listed(host.info())).programs == decode(Info, host.info()).programs
 
 
-def test_a_robot_has_the_folder_of_its_name_if_there_is_one(folder):
+def test_a_robot_uses_the_subfolder_of_its_name(folder):
     (folder.path / "ur5e-1").mkdir()
     assert ProgramFolder.of(folder.path, "ur5e-1").path == folder.path / "ur5e-1"
     assert ProgramFolder.of(folder.path, "ur5e-2").path == folder.path
-
-
-def test_a_folder_that_does_not_exist_is_an_error_of_the_configuration(tmp_path):
-    nowhere = from_mapping({"programs": str(tmp_path / "nowhere")}, "tvist.toml")
-    with pytest.raises(StartError, match=r"programs is .*nowhere.*: must be a folder"):
-        nowhere.program_folder("ur5e")
-    assert from_mapping({}, "tvist.toml").program_folder("ur5e") is None

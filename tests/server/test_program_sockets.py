@@ -1,4 +1,4 @@
-"""The sockets of programs on a real network: who may be reached, what arrives, what is cut, and how much may wait."""
+"""Sockets of programs on a real network: allowed hosts, data, disconnections and limits of buffers."""
 
 import asyncio
 import contextlib
@@ -64,7 +64,7 @@ async def side(allowed):
     await asyncio.sleep(0)
 
 
-async def test_bytes_go_both_ways_and_the_end_is_told_once(side):
+async def test_a_socket_carries_data_both_ways_and_reports_its_end_once(side):
     assert await side.connect() == "opened"
     reader, writer = await side.accepted.get()
     side.sockets.carry_out([Send(1, b"hello")])
@@ -80,7 +80,7 @@ async def test_bytes_go_both_ways_and_the_end_is_told_once(side):
     assert side.changes().count("closed") == 1
 
 
-async def test_a_program_that_closes_hears_nothing_more_and_what_it_sent_arrives(side):
+async def test_a_closed_socket_delivers_sent_data_and_reports_nothing_more(side):
     await side.connect()
     reader, writer = await side.accepted.get()
     side.sockets.carry_out([Send(1, b"last words"), Close(1)])
@@ -91,14 +91,14 @@ async def test_a_program_that_closes_hears_nothing_more_and_what_it_sent_arrives
     assert side.changes() == ["opened"]
 
 
-async def test_a_socket_that_is_closed_while_it_connects_is_never_opened(side):
+async def test_a_socket_closed_while_connecting_is_never_opened(side):
     side.sockets.carry_out([Open(1, HERE, HERE, side.port), Close(1)])
     assert await side.connect(2) == "opened"
     assert [news.number for news in side.heard] == [2]
 
 
 @pytest.mark.parametrize("port", [1, None])
-async def test_a_machine_that_does_not_answer_is_told(side, port):
+async def test_a_failed_connection_is_reported(side, port):
     side.port = port or side.port
     assert await side.connect(address="no.such.host.invalid" if port is None else HERE) == "failed"
 
@@ -111,9 +111,7 @@ async def test_a_machine_that_does_not_answer_is_told(side, port):
         ("192.168.1.5", "localhost", ("localhost",), True),
     ],
 )
-async def test_a_program_reaches_the_machine_that_sent_it_and_those_that_are_allowed(
-    side, origin, address, well
-):
+async def test_a_program_connects_only_to_its_sender_and_allowed_hosts(side, origin, address, well):
     assert await side.connect(address=address, origin=origin) == ("opened" if well else "failed")
     assert bool(side.warned) is not well
     assert well or f"--ur-allow {address}" in side.warned[0]
@@ -121,13 +119,15 @@ async def test_a_program_reaches_the_machine_that_sent_it_and_those_that_are_all
 
 REACHED = """
 h 192.168.1.5 192.168.1.5, h 127.0.0.1 ::1, h 192.168.1.5 ::ffff:192.168.1.5, h 0.0.0.0 127.0.0.1,
-h fe80::1 fe80::1%eth0, h 10.1.2.3, gripper 172.16.0.1, gripper 127.0.0.1 127.0.0.1
+h fe80::1 fe80::1%eth0, h 10.1.2.3, gripper 172.16.0.1, gripper 127.0.0.1 127.0.0.1, h ::1 ::ffff:127.20.3.4
 """
 """Names, addresses, and the machine that sent the program, if one did."""
-NOT_REACHED = "h 192.168.1.6 192.168.1.5, h 0.0.0.0 192.168.1.5, h 172.16.0.1, gripper 127.0.0.1"
+NOT_REACHED = (
+    "h 192.168.1.6 192.168.1.5, h 0.0.0.0 192.168.1.5, h 172.16.0.1, gripper 127.0.0.1, h ::1 ::ffff:10.0.0.2"
+)
 
 
-def test_who_may_be_reached():
+def test_allowed_hosts_by_name_network_and_sender():
     allowed = AllowedHosts(["10.0.0.0/8", "gripper"])
     for places, well in ((REACHED, True), (NOT_REACHED, False)):
         for place in places.split(","):
@@ -135,7 +135,7 @@ def test_who_may_be_reached():
             assert allowed.allows(name, address, origin) is well, place
 
 
-async def test_a_sender_that_floods_has_to_wait_until_the_program_reads(side):
+async def test_a_flooding_sender_is_paused_until_the_program_reads(side):
     await side.connect()
     _, writer = await side.accepted.get()
     size = 64 * MAX_UNREAD
@@ -155,7 +155,7 @@ async def test_a_sender_that_floods_has_to_wait_until_the_program_reads(side):
     assert side.received() == bytes(size)
 
 
-async def test_a_machine_that_does_not_read_is_disconnected(side):
+async def test_a_peer_that_does_not_read_is_disconnected(side):
     await side.connect()
     reader, writer = await side.accepted.get()
     writer.transport.pause_reading()
@@ -166,7 +166,7 @@ async def test_a_machine_that_does_not_read_is_disconnected(side):
     del reader
 
 
-async def test_what_has_arrived_is_told_before_a_time_out(side):
+async def test_received_data_is_reported_before_a_timeout(side):
     await side.connect()
     _, writer = await side.accepted.get()
     side.sockets.carry_out([Wait(7, 1)])
@@ -177,6 +177,6 @@ async def test_what_has_arrived_is_told_before_a_time_out(side):
 
 
 @pytest.mark.parametrize("text", ["300.1.1.1", "10.0.0.0/40", "1.2.3", "a b", "gripper:50002", ""])
-def test_what_is_no_machine_is_refused_and_not_taken_for_a_name(text):
+def test_an_invalid_allowed_host_is_refused(text):
     with pytest.raises(ValueError, match=r"ur_allow has .*must be an IP address, a network"):
         AllowedHosts(["gripper.lab", text])

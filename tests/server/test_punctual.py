@@ -1,4 +1,4 @@
-"""What the system gives and counts of threads, and what the tick thread does not give to others."""
+"""Processors and waiting times of threads; background threads do not inherit those of the tick thread."""
 
 import os
 import subprocess
@@ -27,7 +27,7 @@ def in_a_thread(job):
     thread.join()
 
 
-def test_a_thread_knows_how_long_it_has_waited_for_a_processor():
+def test_the_time_that_a_thread_waits_for_a_processor_is_measured():
     def wait():
         with subprocess.Popen([sys.executable, "-c", "while True: pass"]) as busy:  # on the same processor
             while punctual.waited_us() < 1e4:
@@ -37,14 +37,14 @@ def test_a_thread_knows_how_long_it_has_waited_for_a_processor():
     in_a_thread(wait)
 
 
-def test_slow_work_runs_on_other_processors_than_the_tick_thread():
+def test_background_threads_do_not_inherit_the_tick_threads_processor():
     thread, found = punctual.background("slow"), []
     in_a_thread(lambda: found.append(thread.submit(os.sched_getaffinity, 0).result()))
     thread.shutdown()
     assert found == [os.sched_getaffinity(0)]
 
 
-def test_compiled_code_is_loaded_before_the_first_tick(monkeypatch):
+def test_the_payload_student_loads_its_kernel_when_it_is_made(monkeypatch):
     compiled, called = arm.torques_of, []
     monkeypatch.setattr(arm, "torques_of", lambda *given: called.append(given) or compiled(*given))
     payload_learning.PayloadEstimator(load("ur5e"))

@@ -1,4 +1,4 @@
-"""The file: opened by the plain MCAP reader, valid by its own schemas, equal for equal messages."""
+"""The recording file: opened by the plain MCAP reader, and valid by its own schemas."""
 
 import io
 import json
@@ -56,7 +56,7 @@ def recording():
     return written(session(400)).getvalue()
 
 
-def test_the_plain_reader_opens_it(recording):
+def test_the_plain_mcap_reader_opens_a_recording(recording):
     reader = make_reader(io.BytesIO(recording), validate_crcs=True)
     summary = reader.get_summary()
     encodings = {channel.topic: channel.message_encoding for channel in summary.channels.values()}
@@ -67,7 +67,7 @@ def test_the_plain_reader_opens_it(recording):
     assert {index.compression for index in summary.chunk_indexes} == {"zstd"}
 
 
-def test_the_schemas_validate_every_message_and_times_are_ticks_that_ascend(recording):
+def test_messages_match_their_schemas_and_times_ascend(recording):
     validators, times = {}, []
     for schema, _, message in make_reader(io.BytesIO(recording)).iter_messages(log_time_order=False):
         if schema.id not in validators:
@@ -82,7 +82,7 @@ def test_the_schemas_validate_every_message_and_times_are_ticks_that_ascend(reco
     assert times == sorted(times)
 
 
-def test_metadata_says_how_the_server_was_started_and_what_was_dropped(recording):
+def test_metadata_has_the_start_options_and_dropped_messages(recording):
     metadata = {m.name: m.metadata for m in make_reader(io.BytesIO(recording)).iter_metadata()}
     assert metadata["tvist"]["format"] == "1"
     assert json.loads(metadata["tvist"]["start"]) == START
@@ -90,7 +90,7 @@ def test_metadata_says_how_the_server_was_started_and_what_was_dropped(recording
     assert metadata["tvist.end"] == dict.fromkeys(KINDS, "0")
 
 
-def test_a_start_that_json_cannot_say_is_an_error():
+def test_start_options_that_json_cannot_represent_are_refused():
     for wrong in (float("nan"), object(), float("inf")):
         with pytest.raises((TypeError, ValueError)):
             heading(INFO, {"x": wrong})

@@ -1,4 +1,4 @@
-"""What a served robot tells between two ticks."""
+"""Messages that a served robot publishes between two ticks."""
 
 from tests.controller.robots import setup
 
@@ -24,7 +24,7 @@ class Told(Gateway):
             self.told.append(message)
 
 
-def test_with_the_telemetry_io_is_told_as_it_is_and_not_as_it_was_before_the_last_commands(tmp_path):
+def test_io_published_with_the_telemetry_is_the_present_one(tmp_path):
     robot, gateway = ServedRobot(setup(clock="lockstep"), None, tmp_path), Told(Io)
     robot.open([gateway])
     token = robot.request(c.TakeControl(client="a")).token
@@ -32,12 +32,12 @@ def test_with_the_telemetry_io_is_told_as_it_is_and_not_as_it_was_before_the_las
     assert gateway.told[-1].program_state == "STOPPED"
     assert robot.request(ProgramLoad(name="paper.urp")) == Done()
     assert robot.request(ProgramPlay(token=token)) == Done()
-    robot.tell_telemetry()
+    robot.publish_telemetry()
     robot.driven.jobs.do_waiting()
     assert [(io.program, io.program_state) for io in gateway.told[1:]] == [("paper.urp", "PLAYING")]
 
 
-def test_the_recording_has_inputs_and_outputs_from_the_first_tick_on(tmp_path):
+def test_io_is_recorded_from_the_first_tick(tmp_path):
     robot = ServedRobot(setup(clock="lockstep"), tmp_path / "run.mcap", tmp_path)
     token = robot.request(c.TakeControl(client="a")).token
     robot.request(SimulationStep(token=token, ticks=3))
@@ -49,7 +49,7 @@ def test_the_recording_has_inputs_and_outputs_from_the_first_tick_on(tmp_path):
     assert content.recording["actual_digital_output_bits"].tolist() == [0, 0, 0, 2, 2]
 
 
-def test_a_robot_that_is_stepped_does_not_say_a_state_twice(tmp_path):
+def test_a_stepped_robot_does_not_repeat_a_state(tmp_path):
     robot, gateway = ServedRobot(setup(clock="lockstep"), None, tmp_path), Told(State)
     robot.open([gateway])
     token = robot.request(c.TakeControl(client="a")).token

@@ -21,7 +21,7 @@ def played(robots, ticks, start=1000.0, delay=lambda _: 0.0):
 
 
 @pytest.mark.parametrize("robots", [1, 5])
-def test_all_robots_tick_in_turn_after_one_wake_up_a_period(robots):
+def test_all_robots_tick_in_turn_once_a_period(robots):
     begun = played(robots, 20 * robots)
     assert [robot for robot, *_ in begun] == list(range(robots)) * 20
     times = [now for _, now, *_ in begun]
@@ -32,7 +32,7 @@ def test_all_robots_tick_in_turn_after_one_wake_up_a_period(robots):
 
 
 @pytest.mark.parametrize("robots", [2, 16])
-def test_robots_that_take_less_than_their_share_wake_up_together_and_only_the_first_can_be_late(robots):
+def test_robots_within_their_share_tick_after_one_wake_up(robots):
     schedule, now, woken = Schedule(robots, PERIOD, 0.0), 0.0, 0
     for _ in range(20 * robots):
         woken += schedule.due > now
@@ -42,7 +42,7 @@ def test_robots_that_take_less_than_their_share_wake_up_together_and_only_the_fi
     assert woken == 20
 
 
-def test_each_robot_s_missed_ticks_are_its_own():
+def test_missed_ticks_are_counted_for_each_robot():
     """5.5 periods of nothing: each robot's ticks that begin a period late or more are missed, and no others."""
     robots, delay = 4, 5.5 * PERIOD
     begun = played(robots, 40 * robots, delay=lambda number: delay if number == 10 * robots else 0.0)
@@ -55,7 +55,7 @@ def test_each_robot_s_missed_ticks_are_its_own():
 
 
 @pytest.mark.parametrize("robots", [1, 5])
-def test_a_long_delay_is_made_up_for_by_fifty_ticks_of_each_robot_and_the_rest_is_left_out(robots):
+def test_at_most_fifty_ticks_are_made_up_for_after_a_delay(robots):
     periods = 200
     ticks = robots * 300
     begun = played(robots, ticks, delay=lambda number: periods * PERIOD if number == robots else 0.0)
@@ -68,7 +68,7 @@ def test_a_long_delay_is_made_up_for_by_fifty_ticks_of_each_robot_and_the_rest_i
         assert own[-1][1] == 0.0
 
 
-def test_after_minutes_the_deadlines_have_not_drifted():
+def test_deadlines_do_not_drift():
     robots, start = 3, 1e6
     schedule, ticks = Schedule(robots, PERIOD, start), 90_000
     for _ in range(ticks):
@@ -89,7 +89,7 @@ def loaded(overload, schedule, now, seconds, takes):
 
 
 @pytest.mark.parametrize(("periods", "speed"), [(1.25, 1.0), (8.3, 10.0), (350.0, 0.5)])
-def test_more_are_never_missed_than_were_due_and_what_is_due_is_the_wall_clock_s(periods, speed):
+def test_due_ticks_follow_the_wall_clock_and_bound_the_missed_ones(periods, speed):
     period = PERIOD / speed
     takes = periods * period
     overload, start = TickCounts(period), 1000.0
@@ -100,7 +100,7 @@ def test_more_are_never_missed_than_were_due_and_what_is_due_is_the_wall_clock_s
     assert now - start - behind <= overload.due * period <= now - start
 
 
-def test_an_overload_begins_after_two_seconds_and_ends_after_five_good_ones_and_is_told_once_each():
+def test_an_overload_begins_after_two_bad_and_ends_after_five_good_seconds():
     overload, schedule, now = TickCounts(PERIOD), Schedule(1, PERIOD, 0.0), 0.0
     said, _, now = loaded(overload, schedule, now, 30.0, 1 / 60)
     ((when, why),) = said
@@ -117,7 +117,7 @@ def test_an_overload_begins_after_two_seconds_and_ends_after_five_good_ones_and_
     assert "no longer overloaded" in why
 
 
-def test_between_the_two_limits_nothing_changes():
+def test_overload_has_hysteresis():
     """A tenth of the ticks missed is too few for it to begin and too many for it to end."""
 
     def second(overload, missed):

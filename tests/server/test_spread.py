@@ -1,4 +1,4 @@
-"""Robots spread over processes: nobody is left out, nobody is served twice, and what excludes it is one sentence."""
+"""Robots spread over processes: each is served once, and options that exclude workers are refused."""
 
 import pytest
 from hypothesis import given
@@ -13,7 +13,7 @@ from tvist_server.option_values import StartError
 
 @examples(20)
 @given(st.integers(1, 200), st.data())
-def test_each_robot_is_served_by_one_process_and_their_numbers_differ_by_one_at_most(robots, data):
+def test_robots_are_spread_evenly_over_processes(robots, data):
     workers = data.draw(st.integers(1, robots))
     parts = shares(robots, workers)
     assert [number for part in parts for number in part] == list(range(robots))
@@ -31,13 +31,13 @@ def test_each_robot_is_served_by_one_process_and_their_numbers_differ_by_one_at_
         ({"listen": ["unixsock-stream//tmp/x"]}, "Unix sockets are for the server's own"),
     ],
 )
-def test_what_excludes_several_processes_is_one_sentence(content, named):
+def test_options_that_exclude_workers_are_refused(content, named):
     config = from_mapping({"workers": 2, "robots": "ur5e*2", **content}, "configuration")
     with pytest.raises(StartError, match=named):
         check_together(config, 2)
 
 
-def test_only_the_own_protocol_may_speak_for_the_robots():
+def test_only_the_private_protocol_may_publish_for_robots_behind():
     access = with_robots_behind(open_access(["a"]), ["a"], "", "unixsock-stream")
     subjects = {subject["id"]: subject for subject in access["subjects"]}
     puts = [rule for rule in access["rules"] if "put" in rule["messages"] and "ingress" in rule["flows"]]

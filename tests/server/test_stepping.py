@@ -1,4 +1,4 @@
-"""The clock is a right like control: one holder, who is named; within a step others are served before the stepper."""
+"""The right to step the clock has one holder, and during a step other clients are served."""
 
 import msgpack
 import pytest
@@ -29,17 +29,17 @@ LONG = tuple(StepSetpoint(sequence=n, q=(3.0,) * 6) for n in range(1000))
 
 
 class Network:
-    """A robot's reception, and the thread behind it: jobs are done when the test says."""
+    """A robot's intake, and the thread behind it: jobs are done when the test says."""
 
     def __init__(self):
         self.host, self.jobs, self.replies = Host(Controller(setup(clock="lockstep")), Sink()), Jobs(), []
-        self.reception = RobotIntake(self.host, self.jobs.post, self.carry_out)
+        self.intake = RobotIntake(self.host, self.jobs.post, self.carry_out)
 
     def carry_out(self, admitted, reply):
         self.jobs.post(lambda: reply(self.host.carry_out(admitted)), admitted.client)
 
     def send(self, command):
-        self.reception.request(encode(command), self.replies.append)
+        self.intake.request(encode(command), self.replies.append)
 
     def ask(self, command):
         self.send(command)
@@ -47,7 +47,7 @@ class Network:
         return self.replies[-1]
 
 
-def test_a_long_step_of_the_clock_s_holder_is_read_and_a_stranger_s_is_not():
+def test_a_long_step_is_decoded_only_for_the_holder_of_the_clock():
     def long(token, motion_token):
         return encode(SimulationStep(token=token, ticks=1000, setpoints=LONG, motion_token=motion_token))
 
@@ -75,25 +75,25 @@ def test_a_long_step_of_the_clock_s_holder_is_read_and_a_stranger_s_is_not():
         (c.Stop(), None),
     ],
 )
-def test_who_sent_a_command_is_known_by_its_token_or_its_name(command, client):
+def test_the_client_of_a_command_is_known_by_token_or_name(command, client):
     assert admit(encode(command), LEASE, HOLD).client == client
 
 
-def test_the_end_of_one_session_ends_both_rights():
+def test_control_and_clock_end_with_the_session():
     network = Network()
-    network.reception.client_seen("bert", "1f")
+    network.intake.client_seen("bert", "1f")
     for command in (c.TakeClock(client="bert"), c.TakeControl(client="bert")):
         assert isinstance(network.ask(command), Accepted)
-    network.reception.client_gone("bert", "2f")
-    network.reception.client_gone("anna", "1f")
+    network.intake.client_gone("bert", "2f")
+    network.intake.client_gone("anna", "1f")
     network.jobs.do_waiting()
     assert network.host.standing.clock.client == "bert"
-    network.reception.session_gone("1f")
+    network.intake.session_gone("1f")
     network.jobs.do_waiting()
     assert (network.host.standing.clock, network.host.standing.lease) == (None, None)
 
 
-def test_a_step_in_a_callback_of_a_step_is_refused_and_other_commands_are_carried_out():
+def test_a_nested_step_is_refused_but_a_stop_is_carried_out():
     host, said = LoopbackHost(free_setup()), []
     token = decode_reply(host.request("", encode(c.TakeControl(client="me")))).token
     step = encode(SimulationStep(token=token, ticks=2))
@@ -111,7 +111,7 @@ def test_a_step_in_a_callback_of_a_step_is_refused_and_other_commands_are_carrie
 CLIENTS = st.sampled_from(["stepper", "other", None])
 
 
-def test_what_comes_while_jobs_are_done_waits_for_the_next_time():
+def test_jobs_posted_by_a_job_wait_for_the_next_turn():
     jobs, done = Jobs(), []
     jobs.post(lambda: (done.append(1), jobs.post(lambda: done.append(2))))
     for expected in ([1], [1, 2]):
@@ -122,7 +122,7 @@ def test_what_comes_while_jobs_are_done_waits_for_the_next_time():
 
 @examples(40)
 @given(st.lists(st.lists(CLIENTS, max_size=5), max_size=8), st.lists(CLIENTS, max_size=5))
-def test_within_a_step_others_are_served_at_once_and_every_client_in_its_order(ticks, later):
+def test_during_a_step_jobs_of_other_clients_are_done_in_order(ticks, later):
     """A step, before whose ticks these clients each send something; and what they send after it."""
     jobs, done, sent = Jobs(), [], []
 

@@ -1,4 +1,4 @@
-"""The reading end of RTDE, and the count of its rows: without a socket or a clock."""
+"""The RTDE client and the count of its rows, without a socket or a clock."""
 
 import struct
 
@@ -28,7 +28,7 @@ def data(*numbers):
 
 @examples(40)
 @given(st.lists(st.lists(st.floats(-1e6, 1e6), min_size=5, max_size=5), max_size=20), st.integers(1, 200))
-def test_rows_are_the_same_however_the_bytes_are_cut(rows, size):
+def test_rows_do_not_depend_on_how_bytes_are_split(rows, size):
     client = RtdeClient(NEEDED, OPTIONAL)
     begin = [*answers(b"DOUBLE,VECTOR3D,DOUBLE"), package(PackageKind.START, b"\x01")]
     stream = b"".join([*begin, *(data(*row) for row in rows)])
@@ -37,7 +37,7 @@ def test_rows_are_the_same_however_the_bytes_are_cut(rows, size):
     assert [[*row["timestamp"], *row["q"], *row["payload"]] for row in found] == rows
 
 
-def test_what_a_robot_does_not_know_is_left_out_if_it_may_be():
+def test_optional_variables_that_a_robot_lacks_are_left_out():
     client = RtdeClient(NEEDED, OPTIONAL)
     head, version, recipe = answers(b"DOUBLE,VECTOR3D,NOT_FOUND")
     client.receive(head + version)
@@ -55,7 +55,7 @@ def test_what_a_robot_does_not_know_is_left_out_if_it_may_be():
         (b"DOUBLE", "1 types"),
     ],
 )
-def test_a_recipe_that_cannot_be_read_is_refused(types, word):
+def test_an_unusable_recipe_is_refused(types, word):
     client = RtdeClient(NEEDED, OPTIONAL)
     with pytest.raises(RtdeError, match=word):
         client.receive(b"".join(answers(types)))
@@ -63,7 +63,7 @@ def test_a_recipe_that_cannot_be_read_is_refused(types, word):
 
 @examples(40)
 @given(st.lists(st.integers(0, 9), min_size=1, max_size=200), st.sampled_from([1, 4]), st.floats(0.0, 9.0))
-def test_rows_and_gaps_add_up_to_the_time_of_the_robot(gaps, interval, jitter):
+def test_received_and_missing_rows_add_up_to_the_robots_time(gaps, interval, jitter):
     """A gap of 0 is a row that comes twice; when rows arrive does not matter."""
     count, time = RowCount(interval), 1000
     count.take(0.002 * time, 0.0)
@@ -80,7 +80,7 @@ def test_rows_and_gaps_add_up_to_the_time_of_the_robot(gaps, interval, jitter):
 
 
 @pytest.mark.parametrize("own", [3.0, 5000.0])
-def test_after_a_restart_of_the_robot_ticks_go_on_by_our_clock(own):
+def test_after_a_restart_of_the_robot_ticks_follow_the_local_clock(own):
     count = RowCount(1)
     count.take(100.0, 50.0)
     count.silence()

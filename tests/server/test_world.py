@@ -1,4 +1,4 @@
-"""A robot in a world: its configuration, a program that grips, its recording, and what is judged."""
+"""A robot in a scene: its configuration, a program that grips, its recording and the judged areas."""
 
 import re
 
@@ -14,6 +14,7 @@ from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import ReplayError, replay_file
 from tvist_plant.surroundings import Shape
 from tvist_plant.world.mujoco_arm import MujocoArm
+from tvist_plant.world.scene import build
 from tvist_plant.world.scene_file import find_scene
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Accepted
@@ -48,6 +49,12 @@ end
 HEAVY = Payload(mass=5.0, com=(0.0, 0.0, 0.05), inertia=(0.01, 0.0, 0.0, 0.01, 0.0, 0.01))
 
 
+@pytest.fixture(autouse=True)
+def built_here(monkeypatch):
+    """Build scenes in this process; tests/plant/test_world.py builds them apart."""
+    monkeypatch.setattr("tvist_plant.world.mujoco_arm.build_apart", lambda asked: build(*asked))
+
+
 def config(tmp_path, cell=CELL):
     file = tmp_path / "cell.toml"
     file.write_text(cell)
@@ -58,7 +65,7 @@ def ran(setup, text, record=None):
     return run_in_lockstep(setup, text, (), record=record, attend=lambda _: None, on_record_error=pytest.fail)
 
 
-def test_a_program_lifts_a_box_and_its_recording_does_the_same_again(tmp_path):
+def test_a_program_lifts_a_box_and_its_replay_is_equal(tmp_path):
     file = tmp_path / "run.mcap"
     watch = ran(config(tmp_path).setup(), LIFT, file)
     assert watch.reason == "finished"
@@ -90,7 +97,7 @@ def test_a_program_lifts_a_box_and_its_recording_does_the_same_again(tmp_path):
         ({"world": "table", "hidden": 3}, "world is table, .* but hidden is 3: leave one out"),
     ],
 )
-def test_what_excludes_a_world_is_said(given, said, tmp_path):
+def test_options_that_exclude_a_world_are_refused(given, said, tmp_path):
     with pytest.raises(StartError, match=said):
         ServeConfig(**given).setup()
     part = '\n[[parts]]\nname = "box"\nmass = 1.0\nsize = [0.1, 0.05, 0.1]\npose = [0, 0, 1, 0, 0, 0]\n'
@@ -98,7 +105,7 @@ def test_what_excludes_a_world_is_said(given, said, tmp_path):
         config(tmp_path, CELL + part).setup()
 
 
-def test_an_arm_that_would_stand_in_a_wall_is_one_sentence(tmp_path):
+def test_a_start_inside_an_obstacle_is_refused(tmp_path):
     wall = tmp_path / "wall.xml"
     wall.write_text('<mujoco><worldbody><geom type="box" size="1 1 1"/></worldbody></mujoco>')
     with pytest.raises(
@@ -108,7 +115,7 @@ def test_an_arm_that_would_stand_in_a_wall_is_one_sentence(tmp_path):
 
 
 @pytest.mark.parametrize("given", [{"q": (-2.7, -2.2, -1.8, -0.7, 1.57, 0.0)}, {"payload": HEAVY}])
-def test_a_reset_into_the_world_is_refused_and_changes_nothing(given, tmp_path):
+def test_a_reset_into_an_obstacle_is_refused_and_changes_nothing(given, tmp_path):
     """Where the arm stands it is clear by less than it would bend under another payload."""
     clear, light = (-2.7, -1.8, -1.8, -1.1, 1.57, 0.0), msgspec.structs.replace(HEAVY, mass=0.1)
     x, y, z = Robot(q=clear, carried=light, truth=True).controller.truth().flange_pose[:3]
@@ -132,7 +139,7 @@ def test_a_reset_into_the_world_is_refused_and_changes_nothing(given, tmp_path):
     assert robots[0].controller.truth() == robots[1].controller.truth()
 
 
-def test_a_scene_that_has_changed_is_noted_and_one_that_has_gone_is_asked_for(tmp_path):
+def test_a_replay_notes_a_changed_scene_and_needs_a_missing_one(tmp_path):
     scene, file = tmp_path / "own.xml", tmp_path / "run.mcap"
     scene.write_text('<mujoco><worldbody><geom size="0.1" pos="3 3 3"/></worldbody></mujoco>')
     ran(ServeConfig(world=str(scene), clock="free").setup(), "def a():\n  sleep(0.1)\nend", file)
@@ -153,7 +160,7 @@ def test_a_scene_that_has_changed_is_noted_and_one_that_has_gone_is_asked_for(tm
         ("capsule", (0.0, 0.0, 2.9), (0.8, 0.0, 2.9)),
     ],
 )
-def test_areas_contain_what_their_shape_does(kind, inside, outside):
+def test_an_area_contains_the_points_of_its_shape(kind, inside, outside):
     area = Shape(kind, (1.0, 2.0, 3.0), (0.0,) * 6, None, (0.0,) * 4)
     assert is_inside(area, np.array(inside))
     assert not is_inside(area, np.array(outside))

@@ -1,4 +1,4 @@
-"""The Zenoh gateway, between a desk that notes what it gets and plain Zenoh clients."""
+"""The Zenoh gateway between a recording intake and plain Zenoh clients."""
 
 import json
 import queue
@@ -22,7 +22,7 @@ from tvist_server.gateways.network import Network
 WAIT = 60.0
 
 
-class NotingDesk:
+class RecordingIntake:
     """Notes what arrives, in order; answers at once, from another thread, unless it is told to hold."""
 
     def __init__(self):
@@ -74,8 +74,8 @@ def endpoint():
 
 
 @pytest.fixture
-def desk():
-    return NotingDesk()
+def intake():
+    return RecordingIntake()
 
 
 @pytest.fixture
@@ -86,8 +86,8 @@ def network(endpoint):
 
 
 @pytest.fixture
-def gateway(network, desk):
-    return network.gateway("ur5e", desk, lockstep=False, truth=False)
+def gateway(network, intake):
+    return network.gateway("ur5e", intake, lockstep=False, truth=False)
 
 
 @pytest.fixture
@@ -107,19 +107,17 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("key", "payload", "fields", "said"), REFUSED, ids=lambda _: "")
-def test_a_query_that_is_no_command_to_one_robot_is_refused_without_the_desk_seeing_it(
-    gateway, desk, session, key, payload, fields, said
-):
+def test_an_invalid_query_is_refused_by_the_gateway(gateway, intake, session, key, payload, fields, said):
     (reply,) = replies(session, key, payload)
     assert reply.ok is not None
     assert str(reply.ok.encoding) == "application/msgpack"
     message = msgpack.unpackb(reply.ok.payload.to_bytes())
     assert message | {"type": "refused", "code": "malformed"} | fields == message
     assert said in message["why"]
-    assert desk.notes.empty()
+    assert intake.notes.empty()
 
 
-def test_a_setpoint_on_a_wildcard_key_or_too_large_is_counted_and_dropped(gateway, desk, session):
+def test_set_points_on_wildcards_or_too_large_are_counted_and_dropped(gateway, intake, session):
     for key, payload in (
         ("tvist/*/setpoint", b"wild"),
         ("tvist/**", b"wilder"),
@@ -127,32 +125,32 @@ def test_a_setpoint_on_a_wildcard_key_or_too_large_is_counted_and_dropped(gatewa
         ("tvist/ur5e/setpoint", b"good"),
     ):
         session.put(key, payload, congestion_control=zenoh.CongestionControl.BLOCK)
-    assert desk.next() == ("setpoint", b"good")
+    assert intake.next() == ("setpoint", b"good")
     assert gateway.setpoints_refused == 3
 
 
-def test_a_client_is_seen_before_the_command_it_sends_next_and_its_going_is_seen(gateway, desk, endpoint):
+def test_a_client_is_seen_before_its_next_command_and_when_it_leaves(gateway, intake, endpoint):
     for number in range(5):
         client = connect(endpoint)
         _token = client.liveliness().declare_token(f"tvist/ur5e/client/me {number}")
         replies(client, "tvist/ur5e/command", b"take")
-        assert desk.next() == ("seen", f"me {number}", "")
-        assert desk.next() == ("request", b"take")
+        assert intake.next() == ("seen", f"me {number}", "")
+        assert intake.next() == ("request", b"take")
         client.close()
-        assert desk.next() == ("gone", f"me {number}", "")
+        assert intake.next() == ("gone", f"me {number}", "")
 
 
-def test_the_end_of_a_session_is_told_while_its_token_is_held_elsewhere(gateway, desk, endpoint):
+def test_the_end_of_a_session_is_reported_while_another_holds_its_token(gateway, intake, endpoint):
     with connect(endpoint) as copy:
         client = connect(endpoint)
         session = str(client.info.zid())
         _tokens = [
             each.liveliness().declare_token(f"tvist/ur5e/client/me/{session}") for each in (client, copy)
         ]
-        assert desk.next() == ("seen", "me", session)
+        assert intake.next() == ("seen", "me", session)
         client.close()
-        assert desk.next(ended=True) == ("ended", session)
-    assert desk.next() == ("gone", "me", session)
+        assert intake.next(ended=True) == ("ended", session)
+    assert intake.next() == ("gone", "me", session)
 
 
 def taken(gateway, topic, *, taken):
@@ -164,7 +162,7 @@ def taken(gateway, topic, *, taken):
 
 
 @pytest.mark.parametrize("key", ["tvist/ur5e/state", "**"])
-def test_in_real_time_states_are_taken_while_somebody_subscribes_to_them(gateway, session, endpoint, key):
+def test_in_real_time_states_are_wanted_only_with_subscribers(gateway, session, endpoint, key):
     assert gateway.wanted_topics == {"event", "telemetry", "io"}
     with connect(endpoint) as other:
         others = other.declare_subscriber(key, queue.Queue().put)
@@ -181,25 +179,25 @@ def test_in_real_time_states_are_taken_while_somebody_subscribes_to_them(gateway
     taken(gateway, "state", taken=False)  # it has left without a word
 
 
-def test_who_subscribed_before_the_robot_was_ready_gets_its_states(network, endpoint, desk):
-    network.expect(["ur5e"], desk)
+def test_subscribers_from_before_the_start_are_noticed(network, endpoint, intake):
+    network.expect(["ur5e"], intake)
     with connect(endpoint) as early:
         early.declare_subscriber("tvist/ur5e/truth", queue.Queue().put)
         replies(early, "tvist/ur5e/info")
         told = []
-        gateway = network.gateway("ur5e", desk, lockstep=False, truth=False, wanted=told.append)
+        gateway = network.gateway("ur5e", intake, lockstep=False, truth=False, wanted=told.append)
         taken(gateway, "truth", taken=True)
         assert told == [True]
         assert "state" not in gateway.wanted_topics
 
 
-def test_close_ends_what_is_unanswered_and_a_late_reply_goes_nowhere(network, gateway, desk, session):
-    desk.hold = True
+def test_close_ends_pending_queries_and_ignores_late_replies(network, gateway, intake, session):
+    intake.hold = True
     pending = session.get("tvist/ur5e/command", payload=b"wait", timeout=WAIT)
-    assert desk.next() == ("request", b"wait")
+    assert intake.next() == ("request", b"wait")
     network.close()
     assert list(pending) == []
-    desk.held[0]()
+    intake.held[0]()
     gateway.publish("state", None, b"nobody hears it")
     network.close()
 
@@ -213,14 +211,14 @@ def test_close_ends_what_is_unanswered_and_a_late_reply_goes_nowhere(network, ga
         ("tcp/192.0.2.1:7447", "does not have this address"),
     ],
 )
-def test_an_endpoint_that_cannot_be_listened_on_is_one_clear_sentence(endpoint, sentence):
+def test_an_endpoint_that_cannot_listen_is_refused_with_the_reason(endpoint, sentence):
     with pytest.raises(GatewayError) as raised:
         Network([endpoint])
     assert endpoint in str(raised.value)
     assert sentence in str(raised.value)
 
 
-def test_a_port_in_use_is_one_clear_sentence(network, endpoint):
+def test_a_port_in_use_is_refused(network, endpoint):
     with pytest.raises(GatewayError, match=rf"^cannot listen on {endpoint}: the port is in use: stop"):
         Network([endpoint])
 
@@ -243,7 +241,7 @@ with plain_session(sys.argv[1]) as session:
 """
 
 
-def test_a_reader_that_stops_loses_states_but_no_event_and_never_holds_up_the_publisher(gateway, endpoint):
+def test_a_stopped_reader_loses_states_but_no_events(gateway, endpoint):
     reader = forked.Popen(
         [sys.executable, "-c", READER, endpoint], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     )

@@ -31,7 +31,7 @@ class AllowedHosts:
 
         The loopback interface is open only to programs from this machine, or if it is listed itself.
         """
-        to, sender = _ip(address), None if origin is None else _ip(origin)
+        to, sender = ip_of(address), None if origin is None else ip_of(origin)
         if to.is_loopback or to.is_unspecified:  # a name or a wide network must not open it as a side effect
             named = name == LOCALHOST and name in self._names
             inside = any(network.is_loopback and to in network for network in self._networks)
@@ -39,7 +39,7 @@ class AllowedHosts:
         return to == sender or name in self._names or any(to in network for network in self._networks)
 
 
-def _ip(text: str) -> IpAddress:
+def ip_of(text: str) -> IpAddress:
     """Parse an address without its zone, and unwrap an IPv4-mapped IPv6 address."""
     found = ipaddress.ip_address(text.partition("%")[0])
     return getattr(found, "ipv4_mapped", None) or found

@@ -14,7 +14,7 @@ from tvist_plant.plant import PERIOD
 from tvist_server.allowed_hosts import AllowedHosts
 from tvist_server.clock import Clock, Lockstep, Realtime
 from tvist_server.config import ServeConfig
-from tvist_server.gateways.exposure import check_endpoints, guarded, guarded_interfaces
+from tvist_server.gateways.security import check_endpoints, check_ur_address, server_security
 from tvist_server.option_values import StartError, recording_of
 from tvist_server.robot import ServedRobot
 
@@ -46,34 +46,27 @@ def check_together(config: ServeConfig, robots: int) -> None:
     config.dump_folder()
     config.program_folder(config.name)
     AllowedHosts(config.ur_allow)
-    if config.connect and config.endpoints and config.security is not None:
-        raise StartError(
-            "connect, listen and security exclude each other: the router checks certificates, so leave listen out"
-        )
-    if config.workers == 1:
-        return
-    if config.workers > robots:
-        raise StartError(f"workers is {config.workers}: must be at most the number of robots, {robots}")
-    if "fork" not in multiprocessing.get_all_start_methods():
-        raise StartError(f"workers is {config.workers}: this system cannot fork processes, so give 1")
-    if config.connect and config.endpoints:
-        raise StartError(
-            "connect, listen and workers exclude each other: each process connects to the router, so leave listen out"
-        )
-    if config.connect and config.metrics is not None:
-        raise StartError(
-            "connect, metrics and workers exclude each other: run a server for each process, with metrics on ports of "
-            "their own"
-        )
-    for endpoint in config.endpoints:
-        if endpoint.startswith(LOCAL):
-            raise StartError(
-                f"listen is {endpoint}, and workers is {config.workers}: Unix sockets are for the server's own "
-                "processes, so listen on tcp/ or tls/"
-            )
+    several, routed = config.workers > 1, bool(config.connect)
+    own = next((one for one in config.endpoints if one.startswith(LOCAL)), None)
+    workers = f"workers is {config.workers}"
+    for wrong, why in (
+        (routed and config.endpoints and config.security is not None,
+         "connect, listen and security exclude each other: the router checks certificates, so leave listen out"),
+        (several and config.workers > robots, f"{workers}: must be at most the number of robots, {robots}"),
+        (several and "fork" not in multiprocessing.get_all_start_methods(),
+         f"{workers}: this system cannot fork processes, so give 1"),
+        (several and routed and config.endpoints,
+         "connect, listen and workers exclude each other: each process connects to the router, so leave listen out"),
+        (several and routed and config.metrics is not None,
+         "connect, metrics and workers exclude each other: run one server for each process"),
+        (several and own is not None,
+         f"listen is {own}, and {workers}: Unix sockets are for the server's own processes, so listen on tcp/ or tls/"),
+    ):  # fmt: skip
+        if wrong:
+            raise StartError(why)
 
 
-def made_robot(
+def make_robot(
     setup: Setup, config: ServeConfig, observe: Callable[[Controller], Sink] | None, *, several: bool
 ) -> ServedRobot:
     """Create a robot to serve; raise StartError if that is impossible."""
@@ -87,11 +80,11 @@ def made_robot(
         raise StartError(str(error)) from error
 
 
-def protected(config: ServeConfig, names: Sequence[str]) -> tuple[list[str], dict[str, Any]]:
+def security_of(config: ServeConfig, names: Sequence[str]) -> tuple[list[str], dict[str, Any]]:
     """Return the endpoints to listen on and the settings that protect them; StartError for unprotected exposure."""
     check_endpoints("connect", config.connect)
     # The router checks the certificates of clients that reach the robot through it.
-    return guarded(
+    return server_security(
         config.endpoints,
         names,
         security=None if config.connect else config.security,
@@ -103,14 +96,14 @@ def protected(config: ServeConfig, names: Sequence[str]) -> tuple[list[str], dic
 def ur_interfaces(robot: ServedRobot, config: ServeConfig, number: int) -> "UrInterfaces":
     """Create the UR interfaces of a robot by its index; StartError if others could reach them unprotected."""
     from tvist_server.gateways.ur.interfaces import UrInterfaces
-    from tvist_server.gateways.ur.rtde.inputs import matching
+    from tvist_server.gateways.ur.rtde.variables import matching
 
     address, ports = config.interfaces(number)
-    guarded_interfaces(address, insecure=config.insecure)
+    check_ur_address(address, insecure=config.insecure)
     reserved = matching(config.reserve_inputs)
     setup, lockstep = robot.setup, config.clock != "realtime"
     return UrInterfaces(
-        robot.reception,
+        robot.intake,
         setup.description,
         setup.name,
         address,

@@ -163,7 +163,7 @@ class Realtime(Clock):
 
     def _run(self) -> None:
         try:
-            _wake_sharply()
+            _set_timer_slack()
             if self._priority and take_priority():
                 self.granted.append(f"real-time priority {PRIORITY}")
         finally:
@@ -177,7 +177,7 @@ class Realtime(Clock):
         )
         while self._running:
             if pace is not None:
-                if not self._begins(robots[0], pace):
+                if not self._wait_for_tick(robots[0], pace):
                     silent = self._do_without_tick(robots[0], silent)
                     continue
                 silent = False
@@ -198,7 +198,7 @@ class Realtime(Clock):
         for robot in robots:
             robot.guarded(robot.jobs.do_waiting)
 
-    def _begins(self, robot: TickedRobot, pace: Callable[[float], bool]) -> bool:
+    def _wait_for_tick(self, robot: TickedRobot, pace: Callable[[float], bool]) -> bool:
         """Wait for the arm's next tick. If the arm fails, this clock gives the tick, so that the robot can stop."""
         try:
             return pace(LONGEST_SLEEP)
@@ -217,7 +217,7 @@ class Realtime(Clock):
         return True
 
 
-def _wake_sharply() -> None:
+def _set_timer_slack() -> None:
     """Request exact wake-ups of the calling thread; by default Linux may delay them by 50 µs."""
     with contextlib.suppress(OSError, AttributeError):  # other systems: ticks are later by that much
         ctypes.CDLL(None).prctl(SET_TIMER_SLACK, 1, 0, 0, 0)

@@ -23,16 +23,16 @@ from tvist_server.moving.servo_lag import ServoLag
 from tvist_server.option_values import (
     MAX_ROBOTS,
     StartError,
-    members,
     numbers_of,
     posture,
     read_start_file,
+    robots_in,
     ticks_of,
 )
 from tvist_server.options import DEFAULT_NAME, ProfileName, ServeOptions
 from tvist_server.profiles import PROFILES, Profile
 from tvist_server.program_folder import ProgramFolder
-from tvist_server.start_files import InitialState, calibration_for, read_cell, shaped_by
+from tvist_server.start_files import InitialState, calibration_for, read_cell, with_shaper
 from tvist_server.ur_ports import InterfaceName
 from tvist_server.watching.address import is_place, place_of
 from tvist_server.watching.watched_robot import WatchedRobot
@@ -59,7 +59,7 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
         """Return the initial setup of every robot's controller; raises as `setup` does."""
         if self.robots is None:
             return [self.setup()]
-        found = members(self.robots, MAX_ROBOTS * self.workers)
+        found = robots_in(self.robots, MAX_ROBOTS * self.workers)
         # Robots of the same file differ only in name and noise.
         starts: dict[str, Setup] = {}
         for robot, _ in found:
@@ -75,24 +75,20 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
             for index, (robot, name) in enumerate(found)
         ]
 
-    def program_folder(self, name: str) -> ProgramFolder | None:
-        """Return the folder of a robot's programs, None if there is none; raise StartError if it is not a folder."""
+    def program_folder(self, name: str) -> ProgramFolder:
+        """Return the folder of a robot's programs; raise StartError if it is not a folder."""
         if self.programs is None:
-            return None
-        if not Path(self.programs).is_dir():
-            raise StartError(f"programs is {self.programs!r}: must be a folder that exists")
-        return ProgramFolder.of(Path(self.programs), name)
+            return ProgramFolder()
+        return ProgramFolder.of(_folder("programs", self.programs), name)
 
     def dump_folder(self) -> Path:
         """Return the folder for the record of the last second before a failure; raise StartError if it is not one."""
-        if self.dump is None:
-            try:
-                return Path(tempfile.gettempdir())
-            except FileNotFoundError:  # a container may have no such folder; saving then fails with a message
-                return Path.cwd()
-        if not Path(self.dump).is_dir():
-            raise StartError(f"dump is {self.dump!r}: must be a folder that exists")
-        return Path(self.dump)
+        if self.dump is not None:
+            return _folder("dump", self.dump)
+        try:
+            return Path(tempfile.gettempdir())
+        except FileNotFoundError:  # a container may have no such folder; saving then fails with a message
+            return Path.cwd()
 
     def keep_ticks(self) -> int | None:
         """Return the least number of ticks to keep in the recording (None: all); StartError if `keep` is invalid."""
@@ -110,7 +106,9 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
         except ValueError as error:
             raise StartError(f"ur_address is {self.ur_address!r}: must be an IP address ({error})") from error
         if number and first.is_unspecified:
-            raise StartError(f"ur_address is {self.ur_address}: several robots need one address each")
+            raise StartError(
+                f"ur_address is {self.ur_address}, but several robots need one address each: give the first"
+            )
         ports = self.ur_ports.open()
         if self.cell is not None and self.ur_ports.gripper:
             ports["gripper"] = self.ur_ports.gripper
@@ -173,7 +171,7 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
                 plant=self._plant(cell, description, calibration),
                 hidden=self.hidden,
             )
-            setup = shaped_by(setup, "none" if watched else _either(self.shaper, profile.shaper))
+            setup = with_shaper(setup, "none" if watched else _either(self.shaper, profile.shaper))
             if self.state is not None:
                 setup = read_start_file(self.state, "state", InitialState).on(setup)
             setup.check(placed=not real)
@@ -193,7 +191,10 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
         if not real:
             given = [name for name in _REAL if getattr(self, name)]
             if given:
-                raise ValueError(f"{given[0]} needs a real UR robot: also give --plant ur://ADDRESS")
+                value = getattr(self, given[0])
+                raise ValueError(
+                    f"{given[0]} is {value}: needs a real UR robot, so also give --plant ur://ADDRESS"
+                )
             return
         asked: dict[str, object] = {
             "adapt": self.adapt, "cell": self.cell, "state": self.state, "truth": self.truth or None,
@@ -293,6 +294,12 @@ def from_mapping(content: object, source: str) -> ServeConfig:
         return checked(content, ServeConfig)
     except ProtocolError as error:
         raise StartError(f"{source}: {error.why}") from error
+
+
+def _folder(name: str, given: str) -> Path:
+    if not Path(given).is_dir():
+        raise StartError(f"{name} is {given!r}: must be a folder that exists")
+    return Path(given)
 
 
 def _either(given: T | None, default: T) -> T:

@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Callable
+from functools import partial
 
 from tvist_controller.dispatch.admission import Admitted, admit, admit_command, admit_setpoint
 from tvist_controller.dispatch.rights import NoControlError, Presence
@@ -17,14 +18,14 @@ CarryOut = Callable[[Admitted, Answer], None]
 
 
 class RobotIntake(CommandIntake):
-    """The desk of one robot: admits valid messages and rejects others at once, without the controller."""
+    """Admits valid messages to one robot and rejects others at once, without the controller."""
 
     def __init__(
         self,
         host: Host,  # only its thread-safe methods are called here
         post: QueueJob,
         carry_out: CarryOut,
-        complete_info: Callable[[bytes], bytes] | None = None,  # adds to an encoded `info`
+        complete_info: Callable[[bytes], bytes] = bytes,  # adds to an encoded `info`
     ) -> None:
         self._host, self._post, self._carry_out = host, post, carry_out
         self._complete_info = complete_info
@@ -46,8 +47,7 @@ class RobotIntake(CommandIntake):
 
     def info(self, answer: Callable[[Callable[[], bytes]], None]) -> None:
         def tell() -> None:
-            data, complete = self._host.info(), self._complete_info
-            answer(lambda: data if complete is None else complete(data))
+            answer(partial(self._complete_info, self._host.info()))
 
         self._post(tell)
 

@@ -38,7 +38,7 @@ from tvist_server.gateways.base import Tell
 from tvist_server.punctual import processors
 
 MOVE_TICKS = 1000  # longest time of a motion that uses kernels [ticks]
-LOOK = 0.5  # time between two checks of what is on disk [s]
+CHECK_EVERY = 0.5  # time between two checks of what is on disk [s]
 FILTERS = (("elastic", 1), ("auto", 1), ("zv", 1), ("none", 2))
 """Shapers, each with a number of modes, that together use all kernels of shapers."""
 STUDIES = {"all_to_drives", "drive", "mean_delay", "play", "product_taps", "shape_all"}
@@ -78,10 +78,10 @@ def compile_ahead(processes: int | None = None, tell: Tell | None = None) -> Non
             if tell is not None:
                 tell(compiled(), len(KERNELS))
             with suppress(subprocess.TimeoutExpired):
-                running[0].wait(LOOK)
+                running[0].wait(CHECK_EVERY)
             for process in [process for process in running if process.poll() is not None]:
                 running.remove(process)
-                said = _said(process) or said
+                said = _error_of(process) or said
     finally:  # even if a signal interrupts
         for process in running:
             process.kill()
@@ -97,7 +97,7 @@ def _begin(part: str) -> subprocess.Popen[bytes]:
     return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.STDOUT)  # noqa: S603
 
 
-def _said(process: subprocess.Popen[bytes]) -> str:
+def _error_of(process: subprocess.Popen[bytes]) -> str:
     """Return the error of a process that has ended; empty if it succeeded."""
     said = process.communicate()[0].decode(errors="replace").strip()
     if process.returncode == 0:

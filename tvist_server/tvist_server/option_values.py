@@ -82,7 +82,7 @@ def numbers_of(name: str, given: str | tuple[float, ...], count: int) -> tuple[f
     return numbers
 
 
-def members(text: str, most: int = MAX_ROBOTS) -> list[tuple[str, str]]:
+def robots_in(text: str, most: int = MAX_ROBOTS) -> list[tuple[str, str]]:
     """Return robots and their names of a list such as `ur5e*2,other.toml`, after their files: ur5e-1, ur5e-2, other."""
     robots: list[str] = []
     for entry in text.split(","):
@@ -91,7 +91,7 @@ def members(text: str, most: int = MAX_ROBOTS) -> list[tuple[str, str]]:
             raise StartError(
                 f"robots is {text!r}: must be a list such as ur5e*2,other.toml; a robot is missing"
             )
-        robots += [robot] * (_count(entry, count, most) if star else 1)
+        robots += [robot] * (count_of(f"robots has {entry.strip()!r}", count, most) if star else 1)
         if len(robots) > most:
             raise StartError(
                 f"robots is {text!r}: one process serves at most {MAX_ROBOTS} robots, and more workers serve more"
@@ -110,7 +110,7 @@ def members(text: str, most: int = MAX_ROBOTS) -> list[tuple[str, str]]:
             ) from error
     twice = [name for name, times in Counter(name for _, name in found).items() if times > 1]
     if twice:
-        raise StartError(f"robots is {text!r}: two robots would be named {twice[0]}; rename a file")
+        raise StartError(f"robots is {text!r}: two robots would be named {twice[0]}, so rename a file")
     return found
 
 
@@ -120,10 +120,9 @@ def recording_of(record: str, name: str) -> Path:
     return path.with_name(f"{path.stem}-{name}{path.suffix}")
 
 
-def _count(entry: str, count: str, most: int) -> int:
+def count_of(what: str, count: str, most: int) -> int:
+    """Return the count after a `*`; the message begins with `what`."""
     number = int(count) if count.isascii() and count.isdigit() and len(count) < 10 else 0
     if not 1 <= number <= most:
-        raise StartError(
-            f"robots has {entry.strip()!r}: the count after * must be a whole number from 1 to {most}"
-        )
+        raise StartError(f"{what}: the count after * must be a whole number from 1 to {most}")
     return number

@@ -59,7 +59,7 @@ class PlanAhead:
         host: Host,
         planner: Planner,  # used only by this thread
         post: Callable[[Callable[[], None]], None],  # queues a job for the controller's thread
-        complete: Callable[[Admitted], Admitted | Refused] | None = None,  # adds a file or refuses
+        complete: Callable[[Admitted], Admitted | Refused],  # adds a file or refuses
     ) -> None:
         self._host, self._planner, self._post, self._complete = host, planner, post, complete
         self._lock = threading.Lock()
@@ -120,12 +120,11 @@ class PlanAhead:
         if self._closing:
             self._post(lambda: waiting.answer(_BUSY))
             return
-        if self._complete is not None:
-            completed = self._complete(waiting.admitted)
-            if isinstance(completed, Refused):
-                self._post(lambda: waiting.answer(completed))
-                return
-            waiting = waiting._replace(admitted=completed)
+        completed = self._complete(waiting.admitted)
+        if isinstance(completed, Refused):
+            self._post(lambda: waiting.answer(completed))
+            return
+        waiting = waiting._replace(admitted=completed)
         command = waiting.admitted.command
         row = COMMANDS[type(command)]
         if row.asks:

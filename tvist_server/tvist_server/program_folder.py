@@ -17,9 +17,9 @@ SCRIPT, URP = ".script", ".urp"
 
 
 class ProgramFolder:
-    """The programs in a folder, which is read whenever a client loads one or lists them."""
+    """The programs in a folder, which is read whenever a client loads one or lists them; None: no programs."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path | None = None) -> None:
         self.path = path
 
     @classmethod
@@ -30,6 +30,8 @@ class ProgramFolder:
 
     def names(self) -> list[str]:
         """Return the names of the files; none if there is no folder."""
+        if self.path is None:
+            return []
         try:
             return sorted(entry.name for entry in self.path.iterdir() if entry.suffix in {SCRIPT, URP})
         except OSError:
@@ -40,8 +42,7 @@ class ProgramFolder:
         file = PurePosixPath(name).name
         candidates = [file, file.removesuffix(URP) + SCRIPT] if file.endswith(URP) else [file]
         for candidate in candidates:
-            path = self.path / candidate
-            if path.suffix not in {SCRIPT, URP}:
+            if self.path is None or (path := self.path / candidate).suffix not in {SCRIPT, URP}:
                 continue
             try:
                 data = read_bytes(path, "program")
@@ -68,8 +69,10 @@ class ProgramFolder:
 
     def listed(self, info: bytes) -> bytes:
         """Add the files to the programs in an encoded `info`."""
+        if not (names := self.names()):
+            return info
         content = decode(Info, info)
-        programs = sorted({*content.programs, *self.names()})
+        programs = sorted({*content.programs, *names})
         return encode(msgspec.structs.replace(content, programs=programs))
 
 

@@ -57,7 +57,7 @@ class ServedRobot:
         hosts: AllowedHosts | None = None,  # besides the sender of a program
         keep: int | None = None,  # least number of ticks in the recording; None: all
     ) -> None:
-        self._complete = None if programs is None else programs.complete
+        self._programs = programs or ProgramFolder()
         lockstep = setup.clock != "realtime"
         self._realtime = not lockstep
         self._waited_us = 0.0
@@ -106,16 +106,12 @@ class ServedRobot:
         )
         """The robot as the clock sees it."""
         self.plan_ahead = (
-            None if lockstep else PlanAhead(self.host, Planner(setup), self.driven.post, self._complete)
+            None
+            if lockstep
+            else PlanAhead(self.host, Planner(setup), self.driven.post, self._programs.complete)
         )
         carry_out = self._carry_out if self.plan_ahead is None else self.plan_ahead.submit
-        self.reception = RobotIntake(
-            self.host,
-            self.driven.post,
-            carry_out,
-            None if programs is None else programs.listed,
-        )
-        """Desk to which gateways pass messages."""
+        self.intake = RobotIntake(self.host, self.driven.post, carry_out, self._programs.listed)
         self.gateways: Sequence[Gateway] = ()
 
     def _plans_of_programs(self, setup: Setup) -> Callable[[Command, PlanningState], Callable[[], Plan]]:
@@ -156,7 +152,7 @@ class ServedRobot:
         client = admitted.client
 
         def carry_out() -> None:
-            completed = admitted if self._complete is None else self._complete(admitted)
+            completed = self._programs.complete(admitted)
             if isinstance(completed, Refused):
                 answer(completed)
             else:
@@ -177,7 +173,7 @@ class ServedRobot:
         for gateway in self.gateways:
             gateway.close()
 
-    def tell_telemetry(self) -> None:
+    def publish_telemetry(self) -> None:
         """Publish the server's own figures about this robot, in the controller's thread."""
         punctuality = self.driven.lateness.look()
 
@@ -196,10 +192,10 @@ class ServedRobot:
         self.driven.post(tell)
 
     def _telemetry(self, on_time: LatenessMonitor) -> Telemetry:
-        controller, counters, reception = self.controller, self.controller.counters, self.reception
+        controller, counters, intake = self.controller, self.controller.counters, self.intake
         gateways = self.gateways
         late, lost, limited = controller.motion.streams.counters()
-        refused = reception.setpoints_refused + sum(gateway.setpoints_refused for gateway in gateways)
+        refused = intake.setpoints_refused + sum(gateway.setpoints_refused for gateway in gateways)
         overload = self.driven.overload
         left_out = 0 if controller.watching is None else counters.missed_ticks
         before, self._waited_us = self._waited_us, waited_us() if self._realtime else 0.0
@@ -217,8 +213,8 @@ class ServedRobot:
             setpoints_late=late,
             setpoints_lost=lost,
             setpoints_limited=limited,
-            commands=counters.commands + reception.commands_refused,
-            refused=counters.refused + reception.commands_refused,
+            commands=counters.commands + intake.commands_refused,
+            refused=counters.refused + intake.commands_refused,
             load=None if overload is None else on_time.load,
             due_ticks=None if overload is None else overload.due + left_out,
             due_per_second=None if overload is None else overload.due_per_second,

@@ -17,18 +17,18 @@ from tvist_server.assembly import (
     Share,
     check_paces,
     check_together,
-    made_robot,
     make_clocks,
-    protected,
+    make_robot,
+    security_of,
     ur_interfaces,
 )
 from tvist_server.clock import Realtime
 from tvist_server.config import ServeConfig
 from tvist_server.gateways.base import Gateway, Prepare, Starting
 from tvist_server.gateways.console import Console, ConsoleGateway
-from tvist_server.gateways.exposure import is_local
 from tvist_server.gateways.metrics import Metrics, MetricsGateway
 from tvist_server.gateways.network import Network
+from tvist_server.gateways.security import is_local
 from tvist_server.plan_ahead import PlanAhead
 from tvist_server.robot import ServedRobot
 from tvist_server.shutdown import Shutdown
@@ -76,7 +76,7 @@ class Server:
         self.granted: list[str] = []  # what the system granted to make ticks punctual; complete after `start`
         # A process that others reach through the first one needs no protection.
         listen, guard = (
-            protected(config, [setup.name for setup in setups]) if share.router is None else ([], {})
+            security_of(config, [setup.name for setup in setups]) if share.router is None else ([], {})
         )
         self.robots: list[ServedRobot] = []
         self.metrics: Metrics | None = None  # figures for Prometheus; None if they are not published
@@ -101,7 +101,7 @@ class Server:
             if prepare is not None:
                 prepare(starting.note)
             for setup in setups:
-                self.robots.append(made_robot(setup, config, observe, several=several))
+                self.robots.append(make_robot(setup, config, observe, several=several))
             check_paces(config, self.robots)
             self._clocks = make_clocks(config, self.robots)
             self._interfaces: list[UrInterfaces] = []
@@ -134,12 +134,12 @@ class Server:
         self._network.close()
 
     def _gateways(self, robot: ServedRobot, config: ServeConfig, number: int) -> list[Gateway]:
-        name, desk, lockstep = robot.setup.name, robot.reception, config.clock != "realtime"
+        name, intake, lockstep = robot.setup.name, robot.intake, config.clock != "realtime"
         # Without the option `truth`, that topic is offered only if all clients are on this machine.
         local = not config.connect and all(map(is_local, config.endpoints))
         wanted = robot.want_truth if local else None
         gateways: list[Gateway] = [
-            self._network.gateway(name, desk, lockstep=lockstep, truth=robot.setup.truth, wanted=wanted),
+            self._network.gateway(name, intake, lockstep=lockstep, truth=robot.setup.truth, wanted=wanted),
             robot.sockets,
         ]
         if config.ur:
@@ -203,7 +203,7 @@ class Server:
     async def run(self, ready: Callable[[], None], ending: Shutdown) -> None:
         """Serve until a signal comes or all robots have failed (see `failure`); call `ready` once the robots answer."""
         ended, loop = asyncio.Event(), asyncio.get_running_loop()
-        ending.hear(lambda: loop.call_soon_threadsafe(ended.set))
+        ending.on_request(lambda: loop.call_soon_threadsafe(ended.set))
         self.start()
         try:
             for gateway in (one for robot in self.robots for one in robot.gateways):
@@ -213,7 +213,7 @@ class Server:
                 with contextlib.suppress(TimeoutError):
                     await asyncio.wait_for(ended.wait(), 1.0)
                 for robot in self.robots:
-                    robot.tell_telemetry()
+                    robot.publish_telemetry()
                 self._console.update()
         finally:
             for gateway in (one for robot in self.robots for one in robot.gateways):

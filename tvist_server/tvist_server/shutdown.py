@@ -62,15 +62,15 @@ class Shutdown:
     """A shutdown that a signal requests. Construct it in the main thread.
 
     From then on, signals do not end the process directly. The first one requests the shutdown, which
-    `at_once` or `hear` carries out. Later ones are ignored so that they cannot interrupt it; after `LONGEST`
+    `at_once` or `on_request` carries out. Later ones are ignored so that they cannot interrupt it; after `LONGEST`
     the process ends in any case.
     """
 
     def __init__(self) -> None:
         self._numbers = ending_signals()
-        self._wish: int | None = None
+        self._received: int | None = None
         self._raises = False
-        self._heard: Callable[[], object] | None = None
+        self._call: Callable[[], object] | None = None
         for number in self._numbers:
             signal.signal(number, self._on_signal)
 
@@ -79,28 +79,28 @@ class Shutdown:
         """Let a signal raise in the body: KeyboardInterrupt for SIGINT, else SystemExit with code 0."""
         self._raises = True
         try:
-            if self._wish is not None:
-                self._raise(self._wish)
+            if self._received is not None:
+                self._raise(self._received)
             yield
         finally:
             self._raises = False
 
-    def hear(self, heard: Callable[[], object]) -> None:
+    def on_request(self, call: Callable[[], object]) -> None:
         """Set a function that the main thread calls at a signal, or now if one has come; it may raise RuntimeError."""
-        self._heard = heard
-        if self._wish is not None:
-            heard()
+        self._call = call
+        if self._received is not None:
+            call()
 
     def request(self) -> None:
-        """Request the shutdown, from any thread, after `hear`."""
-        if self._heard is not None:
+        """Request the shutdown, from any thread, after `on_request`."""
+        if self._call is not None:
             with contextlib.suppress(RuntimeError):  # the loop is closed: the shutdown is over
-                self._heard()
+                self._call()
 
     @property
     def signal(self) -> signal.Signals | None:
         """The signal that requested the shutdown; None if none did."""
-        return None if self._wish is None else signal.Signals(self._wish)
+        return None if self._received is None else signal.Signals(self._received)
 
     def close(self) -> None:
         """Ignore the signals until the process ends, because the interpreter removes its handlers earlier."""
@@ -116,9 +116,9 @@ class Shutdown:
             signal.signal(number, signal.SIG_IGN)
 
     def _on_signal(self, number: int, _frame: FrameType | None) -> None:
-        if self._wish is not None:
+        if self._received is not None:
             return
-        self._wish = number
+        self._received = number
         limit_shutdown()
         if self._raises:
             self._raise(number)

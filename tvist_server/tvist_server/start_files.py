@@ -46,7 +46,7 @@ class InitialState(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     def on(self, setup: Setup) -> Setup:
         """Return a setup with the fields of this state that are not None."""
         if self.shaper is not None:
-            setup = shaped_by(setup, self.shaper)
+            setup = with_shaper(setup, self.shaper)
         given: dict[str, Any] = {
             "q": self.q,
             "seed": self.seed,
@@ -56,7 +56,7 @@ class InitialState(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
         return replace(setup, **{name: value for name, value in given.items() if value is not None})
 
 
-def shaped_by(setup: Setup, shaper: str) -> Setup:
+def with_shaper(setup: Setup, shaper: str) -> Setup:
     """Return a setup with another shaper, by name or FILE.py:NAME; OwnFileError or UserFileError if that fails."""
     if not is_file(shaper):
         return replace(setup, shaper=shaper)

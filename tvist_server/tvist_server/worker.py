@@ -5,6 +5,7 @@ import os
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -17,7 +18,7 @@ from tvist_protocol.codec import decode
 from tvist_protocol.stream import Event, State, Telemetry
 from tvist_server.assembly import Share
 from tvist_server.config import ServeConfig
-from tvist_server.gateways.base import GatewayError, Starting
+from tvist_server.gateways.base import GatewayError, Starting, topic_of
 from tvist_server.gateways.metrics import Metrics, MetricsGateway
 from tvist_server.gateways.network import Network
 from tvist_server.option_values import StartError
@@ -39,7 +40,7 @@ class WorkerRefused:
 
 
 @dataclass(frozen=True)
-class Made:
+class WorkerMade:
     """The robots exist but do not tick yet."""
 
     ur: list[tuple[str, dict[InterfaceName, int]]]  # address and ports of each robot's UR interfaces
@@ -59,7 +60,7 @@ class WorkerEnded:
     recordings: list[RecordingResult]
 
 
-News = WorkerRefused | Made | WorkerReady | WorkerEnded
+News = WorkerRefused | WorkerMade | WorkerReady | WorkerEnded
 
 
 @dataclass(frozen=True)
@@ -93,21 +94,19 @@ class DistantMetrics(MetricsGateway):
         # Nobody reads 500 states a second: Zenoh keeps the newest one without a Python call for each.
         newest: RingChannel[zenoh.Sample] = RingChannel(1)
         self._states = session.declare_subscriber(keys.key(robot, "state"), newest)
-        session.declare_subscriber(keys.key(robot, "event"), Callback(self._on_event, indirect=False))
-        session.declare_subscriber(keys.key(robot, "telemetry"), Callback(self._on_telemetry, indirect=False))
+        for kind, topic in ((Event, keys.key(robot, "event")), (Telemetry, keys.key(robot, "telemetry"))):
+            session.declare_subscriber(topic, Callback(partial(self._on_message, kind), indirect=False))
 
     def _arrived(self) -> State | None:
         sample = self._states.try_recv()
         return None if sample is None else decode(State, sample.payload.to_bytes())
 
-    def _on_event(self, sample: zenoh.Sample) -> None:
-        self.count(decode(Event, sample.payload.to_bytes()))
-
-    def _on_telemetry(self, sample: zenoh.Sample) -> None:
-        self.telemetry = decode(Telemetry, sample.payload.to_bytes())
+    def _on_message(self, kind: type[Event | Telemetry], sample: zenoh.Sample) -> None:
+        message = decode(kind, sample.payload.to_bytes())
+        self.publish(topic_of(message), message, b"")
 
 
-def meet_clients(
+def serve_router(
     config: ServeConfig,
     names: Sequence[str],
     listen: Sequence[str],
@@ -116,7 +115,7 @@ def meet_clients(
 ) -> None:
     """Run the process that clients connect to: a router, which also answers for robots that are starting.
 
-    It reports `Made`, then `WorkerReady` once it reaches all robots, and `WorkerEnded` at the end.
+    It reports `WorkerMade`, then `WorkerReady` once it reaches all robots, and `WorkerEnded` at the end.
     """
     place, starting = config.namespace or "", Starting()
     try:
@@ -136,7 +135,7 @@ def meet_clients(
     if metrics is not None:
         for name in names:
             metrics.add(DistantMetrics(network.session, place, name))
-    parent.send(Made([], None if metrics is None else metrics.page))
+    parent.send(WorkerMade([], None if metrics is None else metrics.page))
     awaited, reached = set(names), threading.Event()
 
     def on_token(sample: zenoh.Sample) -> None:
@@ -161,11 +160,11 @@ def meet_clients(
     parent.send(WorkerEnded(None, []))
 
 
-def work(config: ServeConfig, share: Share, parent: ParentPipe) -> None:
+def serve_robots(config: ServeConfig, share: Share, parent: ParentPipe) -> None:
     """Serve robots until the first process ends it or dies.
 
-    It makes its robots and reports `Made`; on the first word it starts them and reports `WorkerReady`; on the last it
-    reports `WorkerEnded`. The first process handles the signals that a terminal sends to all.
+    It makes its robots and reports `WorkerMade`; on the first word it starts them and reports `WorkerReady`;
+    on the last it reports `WorkerEnded`. The first process handles the signals that a terminal sends to all.
     """
     ending = Shutdown()
     ending.close()  # ignores signals
@@ -174,7 +173,7 @@ def work(config: ServeConfig, share: Share, parent: ParentPipe) -> None:
     except (StartError, UserFileError, GatewayError, RecorderError) as error:
         parent.send(WorkerRefused(str(error), isinstance(error, StartError)))
         return
-    parent.send(Made(server.ur))
+    parent.send(WorkerMade(server.ur))
     if not parent.receive():
         server.discard()
         return

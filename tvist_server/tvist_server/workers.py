@@ -20,11 +20,11 @@ from tvist_controller.controller import Controller
 from tvist_controller.dispatch.planner import Planner
 from tvist_controller.host import Host
 from tvist_controller.setup import Setup
-from tvist_server.assembly import LOCAL, Share, check_together, protected, shares
+from tvist_server.assembly import LOCAL, Share, check_together, security_of, shares
 from tvist_server.config import ServeConfig
 from tvist_server.gateways.access import with_robots_behind
 from tvist_server.gateways.base import Prepare
-from tvist_server.gateways.exposure import protocol
+from tvist_server.gateways.security import protocol
 from tvist_server.kernels import warm_up
 from tvist_server.option_values import StartError
 from tvist_server.own_folder import OwnFolder
@@ -33,14 +33,14 @@ from tvist_server.shutdown import Shutdown
 from tvist_server.ur_ports import InterfaceName
 from tvist_server.worker import (
     END,
-    Made,
     News,
     ParentPipe,
     WorkerEnded,
+    WorkerMade,
     WorkerReady,
     WorkerRefused,
-    meet_clients,
-    work,
+    serve_robots,
+    serve_router,
 )
 
 
@@ -53,7 +53,12 @@ class _Worker:
     who: str  # description of the process and its robots
     process: multiprocessing.process.BaseProcess
     pipe: Connection
-    told: WorkerEnded | None = None
+    ended: WorkerEnded | None = None  # its last news
+
+    def send(self, word: object) -> None:
+        """Send it a word, unless it has died, which `run` reports."""
+        with contextlib.suppress(OSError):
+            self.pipe.send(word)
 
 
 class Workers:
@@ -66,7 +71,7 @@ class Workers:
         self.setups = config.setups()
         check_together(config, len(self.setups))
         self._names = [setup.name for setup in self.setups]
-        self._listen, self._guard = protected(config, self._names)
+        self._listen, self._guard = security_of(config, self._names)
         self._config = config
         self.ur: list[tuple[str, dict[InterfaceName, int]]] = []
         """Address and ports of each robot's UR interfaces; empty if they are closed."""
@@ -82,7 +87,7 @@ class Workers:
             self.page = self._made(self._front[0]).page
             """Address of the page with figures for Prometheus; None if they are not published."""
             if prepare is not None:
-                prepare(lambda done, total: self._tell_front((done, total)))
+                prepare(lambda done, total: self._front[0].send((done, total)))
             for setup in {id(setup.description): setup for setup in self.setups}.values():
                 _rehearse(setup)
             self._fork()
@@ -95,11 +100,11 @@ class Workers:
     def run(self, ready: Callable[[], None], ending: Shutdown) -> None:
         """Serve until a signal comes; WorkersError if a process or robot stops, after the others have ended."""
         heard, wake = multiprocessing.Pipe(duplex=False)
-        ending.hear(lambda: wake.send(None))
+        ending.on_request(lambda: wake.send(None))
         why: str | None = None
         try:
             for worker in self._workers:
-                worker.pipe.send(True)
+                worker.send(True)
             waiting: dict[Any, _Worker] = {worker.pipe: worker for worker in self._front + self._workers}
             starting = len(self._workers)
             while why is None:
@@ -113,7 +118,7 @@ class Workers:
                         continue
                     starting -= 1
                     if starting == 0:
-                        self._tell_front(True)
+                        self._front[0].send(True)
                     elif starting < 0:
                         ready()
         finally:
@@ -127,8 +132,7 @@ class Workers:
         failures: list[str] = []
         for group in (self._workers, self._front):  # clients read until the robots have ended
             for worker in group:
-                with contextlib.suppress(OSError):  # it has died
-                    worker.pipe.send(False)
+                worker.send(False)
             failures += [failure for worker in group for failure in self._end(worker)]
             group.clear()
         self._folder.close()
@@ -144,19 +148,10 @@ class Workers:
         gc.collect()
         gc.freeze()  # keeps memory shared: the collector writes to every object that it visits
         parts = shares(len(self.setups), self._config.workers)
-        pipes = [multiprocessing.Pipe() for _ in parts]
         router = None if self._config.connect else self._inside
         for number, part in enumerate(parts):
-            # A process that keeps another one's pipe open would hide the end of the first process from it.
-            rest = [
-                end for other, pair in enumerate(pipes) for end in pair if (other, end) != (number, pair[1])
-            ]
-            rest += [front.pipe for front in self._front]
             who = f"worker {number + 1} of {len(parts)} ({_listed(self._names, part)})"
-            do = partial(work, self._config, Share(part, router))
-            self._workers.append(self._started(who, do, *pipes[number], rest))
-        for _, theirs in pipes:
-            theirs.close()
+            self._workers.append(self._start(who, partial(serve_robots, self._config, Share(part, router))))
         gc.unfreeze()
 
     def _open(self) -> _Worker:
@@ -165,33 +160,22 @@ class Workers:
             listen, place = [*listen, self._inside], config.namespace or ""
             access = with_robots_behind(guard["access_control"], self._names, place, protocol(self._inside))
             guard = {**guard, "access_control": access}
-        ours, theirs = multiprocessing.Pipe()
-        do = partial(meet_clients, config, self._names, listen, guard)
-        front = self._started("the process that clients connect to", do, ours, theirs, [ours])
-        theirs.close()
-        return front
+        do = partial(serve_router, config, self._names, listen, guard)
+        return self._start("the process that clients connect to", do)
 
-    def _started(
-        self,
-        who: str,
-        do: Callable[[ParentPipe], None],
-        ours: Connection,
-        theirs: Connection,
-        rest: Sequence[Connection],
-    ) -> _Worker:
-        process = multiprocessing.get_context("fork").Process(
-            target=_begin, args=(do, theirs, rest, self._folder)
-        )
+    def _start(self, who: str, do: Callable[[ParentPipe], None]) -> _Worker:
+        ours, theirs = multiprocessing.Pipe()
+        # A process that keeps another one's pipe open would hide the end of the first process from it.
+        rest = [ours, *(worker.pipe for worker in self._front + self._workers)]
+        context = multiprocessing.get_context("fork")
+        process = context.Process(target=_begin, args=(do, theirs, rest, self._folder))
         process.start()
+        theirs.close()
         return _Worker(who, process, ours)
 
-    def _tell_front(self, word: object) -> None:
-        with contextlib.suppress(OSError):  # it has died, which `run` reports
-            self._front[0].pipe.send(word)
-
-    def _made(self, worker: _Worker) -> Made:
+    def _made(self, worker: _Worker) -> WorkerMade:
         news = self._news(worker)
-        if isinstance(news, Made):
+        if isinstance(news, WorkerMade):
             return news
         if isinstance(news, WorkerRefused) and news.misuse:
             raise StartError(news.why)
@@ -203,7 +187,7 @@ class Workers:
         except (EOFError, OSError):
             return None
         if isinstance(news, WorkerEnded):
-            worker.told = news
+            worker.ended = news
             self.recordings += news.recordings
         return news
 
@@ -223,15 +207,15 @@ class Workers:
 
     def _end(self, worker: _Worker) -> list[str]:
         """Wait for the end of a process that was told to end; return failures."""
-        already = worker.told is not None or not worker.process.is_alive()
-        while worker.told is None and worker.pipe.poll(END) and self._news(worker) is not None:
+        already = worker.ended is not None or not worker.process.is_alive()
+        while worker.ended is None and worker.pipe.poll(END) and self._news(worker) is not None:
             pass
         worker.process.join(END)
         if worker.process.is_alive():
             worker.process.kill()
             worker.process.join()
             return [f"{worker.who} did not end within {END:g} s and was killed"]
-        failure = None if worker.told is None else worker.told.failure
+        failure = None if worker.ended is None else worker.ended.failure
         return [] if failure is None or already else [failure]
 
 

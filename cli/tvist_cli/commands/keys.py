@@ -19,7 +19,7 @@ from tvist_cli.output import out, print_json
 from tvist_client.transports import certificates as of_client
 from tvist_protocol.keys import check_robot_name
 from tvist_server.gateways.access import Role
-from tvist_server.gateways.exposure import AUTHORITY, CERTIFICATE, CLIENTS, KEY, roles_in
+from tvist_server.gateways.security import AUTHORITY, CERTIFICATE, CLIENTS, KEY, roles_in
 from tvist_server.option_values import StartError
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")

@@ -30,7 +30,7 @@ def router(
     """
     from tvist_client.transports.session import close_session
     from tvist_server.gateways.base import GatewayError
-    from tvist_server.gateways.router import DEFAULT_ENDPOINT, Rate, robots_of, started
+    from tvist_server.gateways.router import DEFAULT_ENDPOINT, Rate, robots_of, start_router
     from tvist_server.option_values import StartError
     from tvist_server.shutdown import Shutdown
 
@@ -42,11 +42,13 @@ def router(
         ending = Shutdown()
         with failing_on(GatewayError), ending.at_once():
             endpoints = listen or [DEFAULT_ENDPOINT]
-            session = started(endpoints, connect or [], rates, robots, security=security, insecure=insecure)
+            session = start_router(
+                endpoints, connect or [], rates, robots, security=security, insecure=insecure
+            )
 
     async def run() -> None:
         ended, loop = asyncio.Event(), asyncio.get_running_loop()
-        ending.hear(lambda: loop.call_soon_threadsafe(ended.set))
+        ending.on_request(lambda: loop.call_soon_threadsafe(ended.set))
         await ended.wait()
 
     try:

@@ -138,7 +138,7 @@ class ProgramServer:
             if loop.time() - renewed > LEASE / 10.0:
                 renewed = loop.time()
                 # The reply does not matter: if control is lost, the program ends anyway.
-                self._robot.reception.command(KeepAlive(token=self._token), lambda _: None)
+                self._robot.intake.command(KeepAlive(token=self._token), lambda _: None)
         await serving
         if self.server.failure is not None:
             self.watch.end("server_failure", self.server.failure)

@@ -8,22 +8,19 @@ from types import SimpleNamespace
 
 import msgspec
 import pytest
+from tests.controller import robots
+from tests.controller.robots import UR5E
 
-from tvist_controller.controller import Controller
 from tvist_controller.instruments.snapshot import Instruments
-from tvist_controller.setup import Setup, paper_payload
-from tvist_plant.description import load
 from tvist_protocol import commands as c
 from tvist_protocol.io import Io
 from tvist_protocol.programs import ProgramLoad
 from tvist_protocol.replies import Done, Refused
-from tvist_protocol.values import Payload
 from tvist_server.gateways.ur.deferred import Deferred
 from tvist_server.gateways.ur.interfaces import UrInterfaces
 
 from .desks import EVERYWHERE, Desk, until
 
-UR5E = load("ur5e")
 TOKEN = "the-token"
 
 
@@ -51,9 +48,9 @@ class FakeControl:
         self.commands.append(command)
         later = Deferred()
         if isinstance(command, ProgramLoad) and command.name == "nothing.urp":
-            later.come(Refused(code="out_of_range", where="name", why="there is no nothing.urp"))
+            later.set(Refused(code="out_of_range", where="name", why="there is no nothing.urp"))
         elif self._waiting is None:
-            later.come(self.reply)
+            later.set(self.reply)
         else:
             self._waiting.append(later)
         return later
@@ -61,7 +58,7 @@ class FakeControl:
     def asked(self, reply):
         """A reply that comes at once."""
         later = Deferred()
-        later.come(reply)
+        later.set(reply)
         return later
 
     def refuse(self, code="no_control", why="another client has control: 'a'", where="", limit=None):
@@ -74,12 +71,12 @@ class FakeControl:
         """Give every answer that is due; to one that asks again in it, too, unless further ones are kept back."""
         waiting, self._waiting = self._waiting or [], [] if keep else None
         for later in waiting:
-            later.come(reply or self.reply)
+            later.set(reply or self.reply)
 
     def lasting(self):
         return self
 
-    def hear(self, answer):
+    def deliver(self, answer):
         answer()
 
     def leave(self):
@@ -93,8 +90,7 @@ class FakeControl:
 
 @cache
 def controller_at_rest():
-    q, payload = UR5E.poses["Q1"], paper_payload(UR5E)
-    return Controller(Setup(description=UR5E, q=q, payload=payload, calibration=None, clock="lockstep"))
+    return robots.Robot(clock="lockstep").controller
 
 
 def io(**changes) -> Io:
@@ -102,27 +98,18 @@ def io(**changes) -> Io:
     return msgspec.structs.replace(controller_at_rest().io(), **changes)
 
 
-class Robot:
+class Robot(robots.Robot):
     """A controller in lockstep, and instruments that read each of its ticks."""
 
-    def __init__(self, description=UR5E, *, io_changes=None, **setup):
-        start = {"q": description.poses.get("Q1"), "payload": paper_payload(description), "calibration": None}
-        self.controller = Controller(
-            Setup(**({"description": description, "clock": "lockstep"} | start | setup))
-        )
-        self.token = self.controller.receive(c.TakeControl(client="a")).token
+    def __init__(self, description=UR5E, *, io_changes=None, **changes):
+        super().__init__(description, clock="lockstep", **changes)
         self.instruments = Instruments(description)
-        declared: Payload = self.controller.declared
-        self.io = io(**({"payload": declared} | (io_changes or {})))
-
-    def send(self, kind, **fields):
-        return self.controller.receive(kind(token=self.token, **fields))
+        self.io = io(**({"payload": self.controller.declared} | (io_changes or {})))
 
     def tick(self, count=1):
         """The snapshot of the last of so many ticks; each is read."""
         for _ in range(count):
-            state, self.events = self.controller.tick()
-            snapshot = self.instruments.snapshot(state, self.io)
+            snapshot = self.instruments.snapshot(super().tick(), self.io)
         return snapshot
 
 

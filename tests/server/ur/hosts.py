@@ -4,6 +4,7 @@ from tvist_server.gateways.ur.deferred import begin
 from tvist_server.gateways.ur.external_control import ExternalControl
 from tvist_server.gateways.ur.programs import Programs
 from tvist_server.gateways.ur.robot import NO_MODE
+from tvist_server.program_folder import ProgramFolder
 
 from .decoders import message
 
@@ -18,7 +19,7 @@ async def here(read):
 
 
 def external(folder=None, fetch=nobody):
-    return ExternalControl(folder, fetch, here)
+    return ExternalControl(folder or ProgramFolder(), fetch, here)
 
 
 def hear(request, answers):
@@ -40,3 +41,27 @@ def host(robot):
 def told(robot):
     """The robot messages that were broadcast."""
     return [message(package) for package in robot.told]
+
+
+class LineClient:
+    """One client of a text interface: sends text, and reads lines."""
+
+    def __init__(self, kind, robot, control):
+        self.sent = []
+        self.session = kind(robot, control, self.sent.append)
+        self.session.opened()
+        self.heard()
+
+    def heard(self):
+        """The lines since the last call."""
+        text, self.sent[:] = b"".join(self.sent).decode(), []
+        assert not text or text.endswith("\n")
+        return text.split("\n")[:-1]
+
+    def send(self, text):
+        self.session.receive(text.encode())
+        return self.heard()
+
+    def ask(self, text):
+        (line,) = self.send(text + "\n")
+        return line

@@ -3,17 +3,9 @@
 import struct
 
 WORD = {
-    "BOOL": "?",
-    "UINT8": "B",
-    "UINT32": "I",
-    "UINT64": "Q",
-    "INT32": "i",
-    "DOUBLE": "d",
-    "VECTOR3D": "ddd",
-    "VECTOR6D": "dddddd",
-    "VECTOR6INT32": "iiiiii",
-    "VECTOR6UINT32": "IIIIII",
-}
+    "BOOL": "?", "UINT8": "B", "UINT32": "I", "UINT64": "Q", "INT32": "i", "DOUBLE": "d", "VECTOR3D": "ddd",
+    "VECTOR6D": "dddddd", "VECTOR6INT32": "iiiiii", "VECTOR6UINT32": "IIIIII",
+}  # fmt: skip
 NAMED = """
 VECTOR6D target_q target_qd target_qdd target_current target_moment actual_q actual_qd actual_current
 VECTOR6D actual_current_window actual_current_as_torque joint_control_output actual_TCP_pose actual_TCP_speed
@@ -42,26 +34,18 @@ for bank in ("output", "input"):
     OUTPUT_TYPES |= {f"{bank}_bit_register_{k}": "BOOL" for k in range(64, 128)}
     OUTPUT_TYPES |= {f"{bank}_int_register_{k}": "INT32" for k in range(48)}
     OUTPUT_TYPES |= {f"{bank}_double_register_{k}": "DOUBLE" for k in range(48)}
+BYTES = [
+    f"{group}_digital_output{end}" for group in ("standard", "configurable", "tool") for end in ("_mask", "")
+]
 INPUT_TYPES = {
-    "speed_slider_mask": "UINT32",
-    "speed_slider_fraction": "DOUBLE",
-    "standard_digital_output_mask": "UINT8",
-    "standard_digital_output": "UINT8",
-    "configurable_digital_output_mask": "UINT8",
-    "configurable_digital_output": "UINT8",
-    "tool_digital_output_mask": "UINT8",
-    "tool_digital_output": "UINT8",
-    "standard_analog_output_mask": "UINT8",
-    "standard_analog_output_type": "UINT8",
-    "standard_analog_output_0": "DOUBLE",
-    "standard_analog_output_1": "DOUBLE",
-    "external_force_torque": "VECTOR6D",
-    "input_bit_registers0_to_31": "UINT32",
-    "input_bit_registers32_to_63": "UINT32",
+    "speed_slider_mask": "UINT32", "speed_slider_fraction": "DOUBLE", **dict.fromkeys(BYTES, "UINT8"),
+    "standard_analog_output_mask": "UINT8", "standard_analog_output_type": "UINT8",
+    "standard_analog_output_0": "DOUBLE", "standard_analog_output_1": "DOUBLE", "external_force_torque": "VECTOR6D",
+    "input_bit_registers0_to_31": "UINT32", "input_bit_registers32_to_63": "UINT32",
     **{f"input_bit_register_{k}": "BOOL" for k in range(64, 128)},
     **{f"input_int_register_{k}": "INT32" for k in range(48)},
     **{f"input_double_register_{k}": "DOUBLE" for k in range(48)},
-}
+}  # fmt: skip
 OWN = dict.fromkeys(("shaped_q", "shaped_qd", "shaped_qdd"), "VECTOR6D")  # outputs that no robot of UR's has
 
 

@@ -1,4 +1,4 @@
-"""Where the interfaces are: addresses, ports, and what is refused before anything is opened."""
+"""Addresses and ports of the interfaces, and configurations refused before a port opens."""
 
 import re
 from pathlib import Path
@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from tvist_server.config import ServeConfig, from_mapping
-from tvist_server.gateways.exposure import guarded_interfaces
+from tvist_server.gateways.security import check_ur_address
 from tvist_server.option_values import StartError
 from tvist_server.ur_ports import WITHOUT_JOINTS, UrPorts
 
@@ -18,7 +18,7 @@ def config(**values) -> ServeConfig:
     return from_mapping({"ur": True, **values}, "tvist.toml")
 
 
-def test_they_are_where_ur_has_them_but_one_can_be_moved_and_another_kept_shut():
+def test_ports_default_to_those_of_ur_and_can_be_changed_or_closed():
     assert config().interfaces(0) == ("127.0.0.1", UrPorts().open())
     _, ports = config(ur_ports={"rtde": 31004, "dashboard": 0}).interfaces(0)
     expected = UrPorts().open() | {"rtde": 31004}
@@ -26,19 +26,19 @@ def test_they_are_where_ur_has_them_but_one_can_be_moved_and_another_kept_shut()
     assert ports == expected
 
 
-def test_of_several_robots_each_has_the_next_address():
+def test_each_further_robot_uses_the_next_address():
     addresses = [config(ur_address="127.0.0.254").interfaces(number)[0] for number in range(3)]
     assert addresses == ["127.0.0.254", "127.0.0.255", "127.0.1.0"]
     assert config(ur_address="::1").interfaces(0)[0] == "::1"
 
 
 @pytest.mark.parametrize("address", ["robot", "127.0.0.300"])
-def test_an_address_that_is_none_is_named(address):
+def test_an_invalid_address_is_refused(address):
     with pytest.raises(StartError, match=f"ur_address is '{address}'"):
         config(ur_address=address).interfaces(0)
 
 
-def test_an_arm_with_seven_joints_is_refused_since_the_last_would_be_missing():
+def test_interfaces_with_joint_values_refuse_an_arm_with_seven_joints():
     seven = {"robot": str(SEVEN), "calibration": "none"}
     with pytest.raises(StartError, match="the robot seven has 7 joints") as refused:
         config(**seven).setups()
@@ -51,7 +51,7 @@ def test_an_arm_with_seven_joints_is_refused_since_the_last_would_be_missing():
     assert from_mapping(seven, "tvist.toml").setups()[0].description.joints == 7
 
 
-def test_everywhere_is_no_address_for_several_and_what_is_no_port_or_door_is_named():
+def test_several_robots_need_one_address_each_and_ports_must_be_valid():
     with pytest.raises(StartError, match="one address each"):
         config(ur_address=EVERYWHERE).interfaces(1)
     for ports in ({"rtd": 30004}, {"rtde": 70000}, {"rtde": -1}, {"rtde": "x"}):
@@ -59,10 +59,10 @@ def test_everywhere_is_no_address_for_several_and_what_is_no_port_or_door_is_nam
             config(ur_ports=ports)
 
 
-def test_nobody_else_reaches_them_unasked():
-    guarded_interfaces("127.9.9.9", insecure=False)
-    guarded_interfaces("::1", insecure=False)
-    guarded_interfaces(EVERYWHERE, insecure=True)
+def test_an_exposed_address_needs_insecure():
+    check_ur_address("127.9.9.9", insecure=False)
+    check_ur_address("::1", insecure=False)
+    check_ur_address(EVERYWHERE, insecure=True)
     for address in (EVERYWHERE, "192.168.1.2", "::"):
         with pytest.raises(StartError, match="insecure"):
-            guarded_interfaces(address, insecure=False)
+            check_ur_address(address, insecure=False)

@@ -1,4 +1,4 @@
-"""The dashboard: what clients ask and the very words they wait for."""
+"""The dashboard: commands of clients, and the exact answers that they compare."""
 
 import re
 from types import SimpleNamespace
@@ -16,7 +16,7 @@ from tvist_server.gateways.ur.dashboard import COMMANDS, LONGEST, DashboardSessi
 
 from .conftest import FakeControl
 from .decoders import message
-from .hosts import host, told
+from .hosts import LineClient, host, told
 
 
 def at(tick=100, **values):
@@ -30,30 +30,6 @@ def moved_to(robot, **values):
     robot.latest = at(**values)
 
 
-class Client:
-    """One client: asks, and hears lines."""
-
-    def __init__(self, robot, control):
-        self.sent = []
-        self.session = DashboardSession(robot, control, self.sent.append)
-        self.session.opened()
-        self.heard()
-
-    def heard(self):
-        """The lines since the last look."""
-        text, self.sent[:] = b"".join(self.sent).decode(), []
-        assert not text or text.endswith("\n")
-        return text.split("\n")[:-1]
-
-    def send(self, text):
-        self.session.receive(text.encode())
-        return self.heard()
-
-    def ask(self, text):
-        (line,) = self.send(text + "\n")
-        return line
-
-
 @pytest.fixture
 def desk(robot):
     """The robot, running and at rest."""
@@ -63,7 +39,7 @@ def desk(robot):
 
 @pytest.fixture
 def client(desk, control):
-    return Client(desk, control)
+    return LineClient(DashboardSession, desk, control)
 
 
 # What clients match whole lines against, or compare them with.
@@ -112,12 +88,12 @@ quit -> Disconnected
 """.strip().split("\n")
 
 
-def test_answers_are_the_words_clients_wait_for(robot, control):
+def test_answers_are_those_that_clients_compare(robot, control):
     asked = set()
     for line in MATCHED:
         moved_to(robot)
         said, answer = line.split(" -> ")
-        (heard,) = Client(host(robot), control).send(said + "\r\n")
+        (heard,) = LineClient(DashboardSession, host(robot), control).send(said + "\r\n")
         assert re.fullmatch(answer, heard), line
         asked |= {find(said)[0]} if find(said) else set()
     assert asked == set(COMMANDS)
@@ -139,7 +115,7 @@ POWER = [
 """What is asked for in a safety mode, and the robot's command for it."""
 
 
-def test_power_and_safety_are_commands_of_the_robot_which_fail_without_control(client, control, desk):
+def test_power_and_safety_commands_fail_without_control(client, control, desk):
     for asked, safety, command in POWER:
         moved_to(desk, safety_mode=safety, safety_status=safety)
         control.reply = Done()
@@ -149,7 +125,7 @@ def test_power_and_safety_are_commands_of_the_robot_which_fail_without_control(c
         assert client.ask(asked) == f"Failed to execute: {asked}"
 
 
-def test_without_control_programs_and_modes_stay_as_they_are(client, control, desk):
+def test_programs_and_modes_do_not_change_without_control(client, control, desk):
     client.ask("load wait_program.urp")
     control.held_by_other = True
     assert client.ask("is in remote control") == "false"
@@ -165,9 +141,7 @@ def test_without_control_programs_and_modes_stay_as_they_are(client, control, de
     assert client.ask("stop") == "Stopped"  # anyone may
 
 
-def test_power_for_a_robot_that_has_it_is_no_failure_and_an_arm_that_still_stops_cannot_be_unlocked(
-    client, control, desk
-):
+def test_power_on_twice_succeeds_and_a_stopping_arm_cannot_be_unlocked(client, control, desk):
     control.refuse("wrong_mode", why="it moves")
     assert client.send("power on\nbrake release\n") == ["Powering on", "Brake releasing"]
     moved_to(desk, safety_mode=3, safety_status=3)
@@ -190,14 +164,14 @@ def test_modes_have_ur_s_names(client, desk):
     assert client.ask("safetymode").startswith("Safetymode: ")
 
 
-def test_the_operational_mode_is_the_robots(client, desk, control):
+def test_the_operational_mode_is_shared_by_all_clients(client, desk, control):
     client.ask("set operational mode automatic")
-    assert Client(desk, control).ask("get operational mode") == "AUTOMATIC"
+    assert LineClient(DashboardSession, desk, control).ask("get operational mode") == "AUTOMATIC"
     client.ask("clear operational mode")
     assert client.ask("get operational mode") == "NONE"
 
 
-def test_popups_and_the_log_are_told_to_who_listens_to_the_robot(client, desk):
+def test_popups_and_log_messages_are_sent_as_robot_messages(client, desk):
     client.ask("popup Mind the gap")
     client.ask("addToLog it went well")
     window, line = told(desk)
@@ -229,7 +203,7 @@ PLAYING, STOPPING, STOPPED = 2, 0, 1
 @pytest.mark.parametrize(
     ("asked", "answer"), [("stop", "Stopped"), ("load Q1.urp", "Loading program: Q1.urp")]
 )
-def test_what_was_stopped_rests_when_that_is_answered(client, control, desk, asked, answer):
+def test_stop_and_load_are_answered_once_the_arm_is_at_rest(client, control, desk, asked, answer):
     control.reply = Accepted(id=7)
     client.send("load Q2.urp\nplay\n")
     moved_to(desk, runtime_state=PLAYING)
@@ -241,7 +215,7 @@ def test_what_was_stopped_rests_when_that_is_answered(client, control, desk, ask
     assert client.heard() == [answer, "Robotmode: RUNNING"]
 
 
-def test_what_does_not_come_to_rest_has_not_been_stopped(client, desk):
+def test_stop_fails_if_the_arm_does_not_come_to_rest(client, desk):
     moved_to(desk, runtime_state=PLAYING)
     client.send("stop\n")
     client.session.sample(at(2599, runtime_state=PLAYING))
@@ -251,7 +225,7 @@ def test_what_does_not_come_to_rest_has_not_been_stopped(client, desk):
     assert client.ask("robotmode") == "Robotmode: RUNNING"
 
 
-def test_answers_come_in_the_order_of_the_questions_and_who_quits_gets_nothing_more(client, control):
+def test_answers_keep_their_order_and_end_with_quit(client, control):
     control.wait()
     assert client.send("robotmode\npower on\npower off\nquit\nrobotmode\n") == ["Robotmode: RUNNING"]
     assert len(control.commands) == 1  # the next begins when the last was answered
@@ -262,7 +236,7 @@ def test_answers_come_in_the_order_of_the_questions_and_who_quits_gets_nothing_m
     assert client.send("robotmode\n") == []
 
 
-def test_a_line_that_is_too_long_is_one_line(client):
+def test_an_overlong_line_is_answered_once(client):
     client.session.receive(b"x" * (3 * LONGEST))
     first, second = client.send("y\nrobotmode\n")
     assert first.startswith("could not understand: 'xxx")
@@ -280,7 +254,7 @@ LINES = st.one_of(
 
 @examples(40)
 @given(lines=st.lists(LINES.map(lambda line: line.replace(b"\n", b"")), max_size=20), data=st.data())
-def test_every_line_is_answered_with_one_line(lines, data):
+def test_every_line_gets_exactly_one_answer(lines, data):
     lines = [line for line in lines if line.strip().lower() != b"quit"]
     said = {"tell": message, "report_refusal": str}
     robot = host(SimpleNamespace(description=UR5E, name="a", serial="20245500001", latest=None, **said))
@@ -288,7 +262,7 @@ def test_every_line_is_answered_with_one_line(lines, data):
     control = FakeControl()
     control.held_by_other = data.draw(st.booleans())
     control.change = lambda _: control.asked(data.draw(replies))
-    client = Client(robot, control)
+    client = LineClient(DashboardSession, robot, control)
     stream = b"".join(line + b"\n" for line in lines)
     cut = data.draw(st.integers(0, len(stream)))
     client.session.receive(stream[:cut])

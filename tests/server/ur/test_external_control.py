@@ -1,4 +1,4 @@
-"""Programs with a node External Control: loaded by name, completed by the client that plays them, then played."""
+"""Programs with an External Control node: loaded by name, completed by the client that plays them, and played."""
 
 import asyncio
 
@@ -30,7 +30,7 @@ def of(robot, folder=None, answer=SENT):
     return Programs(robot, external(folder, fetch)), asked
 
 
-def test_it_exists_without_a_file_and_gets_its_text_when_it_is_played(robot, control):
+def test_the_built_in_program_gets_its_text_when_it_is_played(robot, control):
     programs, asked = of(robot)
     outcomes, heard = [], []
     hear(programs.load("/programs/external_control.urp", control), outcomes)
@@ -46,7 +46,7 @@ def test_it_exists_without_a_file_and_gets_its_text_when_it_is_played(robot, con
 
 
 @pytest.mark.parametrize(("answer", "code"), [(None, None), (SENT, "script_error")])
-def test_a_machine_that_does_not_answer_or_sends_a_wrong_text_starts_nothing(robot, control, answer, code):
+def test_no_program_starts_without_a_valid_text(robot, control, answer, code):
     programs, _ = of(robot, answer=answer)
     hear(programs.load("external_control.urp", control), [])
     if code is not None:
@@ -58,7 +58,7 @@ def test_a_machine_that_does_not_answer_or_sends_a_wrong_text_starts_nothing(rob
 
 
 @pytest.mark.parametrize("what", ["stop", "load", "play"])
-def test_what_comes_while_a_machine_is_asked_counts(robot, control, what):
+def test_stop_load_and_play_cancel_a_pending_request_for_the_text(robot, control, what):
     waiting = [Deferred(), Deferred()]
     left = iter(waiting)
     programs = Programs(robot, external(fetch=lambda _: next(left)))
@@ -70,12 +70,12 @@ def test_what_comes_while_a_machine_is_asked_counts(robot, control, what):
     else:
         hear(getattr(programs, what)(control), heard if what == "play" else [])
     for sent in waiting:
-        sent.come(SENT)
+        sent.set(SENT)
     assert heard == [False] + ([True] if what == "play" else [])
     assert len(control.of(ProgramPlay)) == (1 if what == "play" else 0)
 
 
-def test_a_file_of_this_name_comes_first_and_other_programs_are_left_alone(robot, control, tmp_path):
+def test_a_file_named_external_control_replaces_the_built_in_program(robot, control, tmp_path):
     (tmp_path / "external_control.script").write_text("sync()\n")
     (tmp_path / "bad.urp").write_bytes(b"\xff")
     programs, asked = of(robot, ProgramFolder(tmp_path))
@@ -97,7 +97,7 @@ def test_a_file_of_this_name_comes_first_and_other_programs_are_left_alone(robot
         ([b"\xff\n"], True, None),
     ],
 )
-async def test_a_machine_is_asked_for_its_program(monkeypatch, pieces, ends, text):
+async def test_the_program_is_requested_from_the_client(monkeypatch, pieces, ends, text):
     """The library sends its program in one go and leaves the connection open; another may end it."""
     asked = []
 
@@ -117,6 +117,6 @@ async def test_a_machine_is_asked_for_its_program(monkeypatch, pieces, ends, tex
     assert asked == [b"request_program\n"]
 
 
-async def test_where_nobody_listens_the_answer_is_none(monkeypatch):
+async def test_a_client_that_does_not_listen_sends_no_program(monkeypatch):
     monkeypatch.setattr(program_request, "PORT", 1)
     assert await asyncio.wait_for(program_of("127.0.0.1"), 60) is None

@@ -1,4 +1,4 @@
-"""Whatever the bytes, and however they are cut: each interface of a robot stands, and its other clients notice nothing.
+"""Random bytes, split anywhere: each interface survives, and its other clients are served as before.
 
 The controller is a real one. Its replies come late, as over a thread, so that clients go while they are on their way.
 """
@@ -45,7 +45,7 @@ class House(ControllerThread):
     def __init__(self):
         super().__init__(late=True)
         self.instruments = Instruments(UR5E)
-        self.boards = defaultdict(PackageEncoder)
+        self.encoders = defaultdict(PackageEncoder)
         self.robot = UrRobot(UR5E, "ur5e", self.tell, external(), lambda _: None, lambda _: None)
         self.leases = {host: HostLease(self, host, self.post) for host in ("127.0.0.1", "127.0.0.2")}
         self.clients = []
@@ -84,8 +84,8 @@ class Client:
         self.house, self.interface = house, interface
         self.stream, self.sampled, self.rest = bytearray(), b"", b""
         self.control = ConnectionControl(house.leases[host])
-        board = (house.boards,) if interface == "rtde" else ()
-        self.session = INTERFACES[interface](house.robot, self.control, self.take, *board)
+        encoder = (house.encoders,) if interface == "rtde" else ()
+        self.session = INTERFACES[interface](house.robot, self.control, self.take, *encoder)
         house.clients.append(self)
         self.session.opened()
 
@@ -145,27 +145,11 @@ def rtde(random):
 
 
 ORDERS = [
-    "power on",
-    "power off",
-    "set robotmode run",
-    "set unlock protective stop",
-    "stop program",
-    "set sim",
-]
+    "power on", "power off", "set robotmode run", "set unlock protective stop", "stop program", "set sim",
+]  # fmt: skip
 SCRIPTS = [
-    "def f():\n",
-    "sec g():\n",
-    " if x:\n",
-    "end\n",
-    "end",
-    "  movej(q)\n",
-    '"',
-    "#",
-    "\r\n",
-    "\n",
-    "\0",
-    "ü",
-]
+    "def f():\n", "sec g():\n", " if x:\n", "end\n", "end", "  movej(q)\n", '"', "#", "\r\n", "\n", "\0", "ü",
+]  # fmt: skip
 
 
 def script(random):
@@ -242,7 +226,7 @@ def attack(house, interface, random, packages):
     "packages", [160, pytest.param(20_000, marks=[pytest.mark.nightly, pytest.mark.timeout(3600)])]
 )
 @pytest.mark.parametrize("interface", INTERFACES)
-def test_a_door_stands_and_nobody_else_notices(interface, packages):
+def test_random_bytes_break_no_interface_and_disturb_no_other_client(interface, packages):
     house, random = House(), Random(packages)
     house.host.tick()
     house.tick()

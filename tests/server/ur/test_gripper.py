@@ -1,4 +1,4 @@
-"""The port of a cell's gripper: requests are answered in order, however many come; without a gripper it is shut."""
+"""The port of a cell's gripper: many requests are answered in order."""
 
 import asyncio
 from types import SimpleNamespace
@@ -14,7 +14,7 @@ from .desks import connect, until
 MANY = 300  # requests at once: more than may wait for their answers
 
 
-async def test_requests_are_answered_in_their_order_even_if_many_come_at_once(make_desk):
+async def test_many_requests_to_the_gripper_are_answered_in_order(make_desk):
     plant, terminals = FlexibleArm(UR5E, UR5E.payload), SimpleNamespace(set_tcp=print)
     cell, waiting = LiveCell(a_cell(), UR5E, plant, terminals, print), []
     desk = make_desk({"gripper": 0}, gripper=lambda *asked: waiting.append(asked))

@@ -1,4 +1,4 @@
-"""The interfaces' sockets: who comes in, who is slow, who has gone."""
+"""Sockets of the interfaces: new, slow and disconnected clients."""
 
 import asyncio
 import gc
@@ -18,10 +18,11 @@ from tvist_protocol.programs import ProgramStop
 from tvist_server.gateways.base import GatewayError
 from tvist_server.gateways.ur.interfaces import UrInterfaces
 
+from . import rtde_client
 from .desks import PATIENCE, connect, connect_and_greet, lines, until
 
 
-async def test_every_door_speaks_its_language(desk):
+async def test_every_port_answers_in_its_protocol(desk):
     reader, writer = await connect(desk, "dashboard")
     assert (await reader.readline()).startswith(b"Connected")
     assert await lines(reader, writer, "robotmode") == ["Robotmode: RUNNING"]
@@ -37,11 +38,11 @@ async def test_every_door_speaks_its_language(desk):
         package = await reader.readexactly(1220)
         assert struct.unpack_from(">id", package) == (1220, 40.0 + desk.controller.now)
     reader, writer = await connect(desk, "rtde")
-    writer.write(struct.pack(">HBH", 5, ord("V"), 2))
+    writer.write(rtde_client.version())
     assert await reader.readexactly(4) == struct.pack(">HBB", 4, ord("V"), 1)
 
 
-async def test_a_client_that_stops_reading_loses_samples_and_nobody_else_does(desk):
+async def test_only_the_client_that_stops_reading_loses_samples(desk):
     quick, _ = await connect(desk, "realtime")
     _, slow = await connect(desk, "realtime")
     slow.transport.pause_reading()
@@ -58,7 +59,7 @@ async def test_a_client_that_stops_reading_loses_samples_and_nobody_else_does(de
     assert dropped[1] > 0
 
 
-async def test_a_fault_of_ours_ends_one_connection_and_no_other(desk, monkeypatch, caplog):
+async def test_an_exception_ends_only_its_connection(desk, monkeypatch, caplog):
     (broken, _), (whole, _) = [await connect(desk, "realtime") for _ in range(2)]
     await until(lambda: len(desk.interfaces._connections) == 2)
     first = next(iter(desk.interfaces._connections))
@@ -75,7 +76,7 @@ async def test_a_fault_of_ours_ends_one_connection_and_no_other(desk, monkeypatc
     assert "failed" in caplog.text
 
 
-async def test_a_port_in_use_is_said_with_what_to_do(desk):
+async def test_a_port_in_use_is_refused_with_the_next_step(desk):
     ports = {"rtde": desk.interfaces.ports["rtde"]}
     with pytest.raises(GatewayError, match=rf"port {ports['rtde']} for rtde: .*--ur-port"):
         UrInterfaces(desk, UR5E, "ur5e", "127.0.0.1", ports)
@@ -83,7 +84,7 @@ async def test_a_port_in_use_is_said_with_what_to_do(desk):
         UrInterfaces(desk, UR5E, "ur5e", "203.0.113.7", {"rtde": 0})
 
 
-async def test_a_file_that_is_never_read_to_its_end_keeps_nobody_waiting(desk):
+async def test_a_file_that_blocks_delays_no_other_request(desk):
     """Neither those who ask or stop elsewhere, nor a stop behind it."""
     read = threading.Event()
     desk.interfaces.robot.programs._external._folder = SimpleNamespace(
@@ -111,7 +112,7 @@ async def test_in_lockstep_nothing_is_dropped(make_desk):
     assert stamps == [40.0 + tick * 0.002 for tick in range(first, first + ticks)]
 
 
-async def test_a_client_that_asks_and_does_not_read_is_not_asked_for_more(desk):
+async def test_reading_from_a_client_that_does_not_read_is_paused(desk):
     reader, writer = await connect_and_greet(desk)
     reader._transport.pause_reading()
     (connection,) = desk.interfaces._connections
@@ -124,7 +125,7 @@ async def test_a_client_that_asks_and_does_not_read_is_not_asked_for_more(desk):
         assert await asyncio.wait_for(reader.readline(), PATIENCE)
 
 
-async def test_scripts_by_the_thousand_cut_nobody_off_who_hears_of_them_and_are_few_lines(desk, caplog):
+async def test_thousands_of_scripts_disconnect_nobody_and_log_few_lines(desk, caplog):
     (listener, _), (_, writer) = await connect(desk, "primary"), await connect(desk, "realtime")
     await until(lambda: len(desk.interfaces._connections) == 2)
     writer.write(b"nothing_of_that_name()\n" * 3000)
@@ -139,9 +140,7 @@ async def test_scripts_by_the_thousand_cut_nobody_off_who_hears_of_them_and_are_
     assert any("left out here" in line for line in caplog.messages)
 
 
-async def test_what_a_client_sends_waits_with_the_client_until_the_controller_has_done_what_came_before(
-    desk, monkeypatch
-):
+async def test_reading_is_paused_while_many_commands_wait(desk, monkeypatch):
     due = []
     monkeypatch.setattr(desk, "command", lambda command, answer, _origin=None: due.append((command, answer)))
     _, writer = await connect(desk, "realtime")
@@ -159,11 +158,10 @@ async def test_what_a_client_sends_waits_with_the_client_until_the_controller_ha
     assert 1 < most < 100
 
 
-async def test_a_tick_leaves_nothing_for_the_collector(desk):
+async def test_a_tick_leaves_no_reference_cycles(desk):
     reader, writer = await connect(desk, "rtde")
-    names = b"actual_q,target_current,output_int_register_3"
-    recipe = struct.pack(">HBd", 11 + len(names), ord("O"), 500.0) + names
-    writer.write(struct.pack(">HBH", 5, ord("V"), 2) + recipe + struct.pack(">HB", 3, ord("S")))
+    recipe = rtde_client.outputs(["actual_q", "target_current", "output_int_register_3"])
+    writer.write(rtde_client.version() + recipe + rtde_client.package("S"))
     for _ in range(3):
         await reader.readexactly(struct.unpack(">H", await reader.readexactly(2))[0] - 2)
     gc.collect()
@@ -177,7 +175,7 @@ async def test_a_tick_leaves_nothing_for_the_collector(desk):
         gc.enable()
 
 
-async def test_a_client_whose_machine_lost_power_is_found_out(desk):
+async def test_keepalive_detects_a_client_without_power_within_30_s(desk):
     await connect(desk, "dashboard")
     await until(lambda: desk.interfaces._connections)
     (connection,) = desk.interfaces._connections
@@ -188,9 +186,7 @@ async def test_a_client_whose_machine_lost_power_is_found_out(desk):
     assert idle + every * found.getsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPCNT) <= 30
 
 
-async def test_without_a_client_ticks_wait_for_others_and_nothing_is_missing_for_the_next_one(
-    make_desk, monkeypatch
-):
+async def test_without_clients_ticks_are_batched_and_none_is_lost(make_desk, monkeypatch):
     desk = make_desk({"rtde": 0, "dashboard": 0})
     house = desk.interfaces
     waiting = asyncio.create_task(house.open())
@@ -198,8 +194,8 @@ async def test_without_a_client_ticks_wait_for_others_and_nothing_is_missing_for
     assert not waiting.done(), "who comes first finds a robot"
     await desk.tick()
     await waiting
-    looks, look = [], house._look
-    monkeypatch.setattr(house, "_look", lambda: looks.append(1) or look())
+    looks, look = [], house._handle_queue
+    monkeypatch.setattr(house, "_handle_queue", lambda: looks.append(1) or look())
     reference, states = Instruments(UR5E), [house.robot.latest.state]
     reference.snapshot(states[0], house._io)
     for _ in range(95):
@@ -216,7 +212,7 @@ async def test_without_a_client_ticks_wait_for_others_and_nothing_is_missing_for
         assert getattr(house.robot.latest, name) == getattr(expected, name)
 
 
-async def test_a_client_that_leaves_at_once_without_reading_has_sent_its_script(desk):
+async def test_the_script_of_a_client_that_resets_its_connection_runs(desk):
     stream = socket.create_connection(("127.0.0.1", desk.interfaces.ports["realtime"]))
     await until(lambda: desk.interfaces._connections)
     await desk.tick()

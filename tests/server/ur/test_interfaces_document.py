@@ -1,4 +1,4 @@
-"""The page about the interfaces says what they do."""
+"""The reference page of the interfaces matches the code."""
 
 import re
 from pathlib import Path
@@ -22,13 +22,13 @@ def test_every_dashboard_command_has_a_row():
         assert 1 <= len(rows) <= 1 + (command.keyword == "load")  # of an installation, too
 
 
-def test_parts_of_the_robot_state_have_the_lengths_that_are_said(snapshot, robot):
+def test_the_documented_lengths_of_the_robot_state_are_right(snapshot, robot):
     ((_, body),) = split(robot_state(robot.description, snapshot))
     said = {row[0]: row[1] for row in ROWS if len(row) == 5 and row[0].isdecimal()}
     assert said == {str(number): str(5 + len(part)) for number, part in parts(body)}
 
 
-def test_the_real_time_packages_layout_is_the_one_that_is_sent():
+def test_the_documented_layout_of_the_real_time_package_is_right():
     wanted, at = [], 0
     for name, count in LAYOUT:
         span = str(at) if count == 1 else f"{at}–{at + count - 1}"

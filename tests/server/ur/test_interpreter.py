@@ -1,4 +1,4 @@
-"""UR's interpreter mode: statements for a running program, and the lines that answer them."""
+"""UR's interpreter mode: statements for a running program, and their answers."""
 
 import asyncio
 from types import SimpleNamespace
@@ -15,18 +15,7 @@ from tvist_server.gateways.ur.programs import Programs
 
 from .conftest import FakeControl, io
 from .desks import PATIENCE, connect, lines, until
-from .hosts import external
-
-
-class Client:
-    def __init__(self, robot, control):
-        self.sent = []
-        self.session = InterpreterSession(robot, control, self.sent.append)
-
-    def say(self, text):
-        self.session.receive(text.encode())
-        heard, self.sent[:] = b"".join(self.sent).decode().splitlines(), []
-        return heard
+from .hosts import LineClient, external
 
 
 @pytest.fixture
@@ -37,21 +26,21 @@ def robot():
 @pytest.fixture
 def client(robot, control):
     robot.programs.io(io(interpreter=Interpreter(interpreted=9, executed=7, cleared=4, waiting=2)))
-    return Client(robot, control)
+    return LineClient(InterpreterSession, robot, control)
 
 
 def test_a_statement_is_passed_on_and_acknowledged_with_its_number(client, control):
     control.reply = Accepted(id=10)
-    assert client.say("movej([0,0,0,0,0,0])\r\n") == ["ack: 10: movej([0,0,0,0,0,0])"]
+    assert client.send("movej([0,0,0,0,0,0])\r\n") == ["ack: 10: movej([0,0,0,0,0,0])"]
     control.reply = Accepted(id=11)
-    assert client.say("  a = 1 b = 2\n") == ["ack: 11: a = 1 b = 2"]
+    assert client.send("  a = 1 b = 2\n") == ["ack: 11: a = 1 b = 2"]
     assert [command.text for command in control.commands] == ["movej([0,0,0,0,0,0])", "a = 1 b = 2"]
 
 
-def test_a_line_that_is_too_long_is_discarded_and_not_passed_on(client, control):
+def test_an_overlong_statement_is_discarded(client, control):
     control.reply = Accepted(id=10)
-    assert client.say("x" * (LONGEST + 1)) == []
-    heard = client.say("x = 2\ny = 2\n")
+    assert client.send("x" * (LONGEST + 1)) == []
+    heard = client.send("x = 2\ny = 2\n")
     assert heard[0].startswith("discard: Statement is too long: it has more than")
     assert heard[1:] == ["ack: 10: y = 2"]
     assert [command.text for command in control.commands] == ["y = 2"]
@@ -68,54 +57,56 @@ REFUSED = [
 ]  # fmt: skip
 
 
-def test_a_statement_that_is_refused_is_discarded_with_the_reason(client, control):
+def test_a_refused_statement_is_discarded_with_the_reason(client, control):
     for code, why, where, said in REFUSED:
         control.refuse(code, why=why, where=where)
-        assert client.say("f()\n") == [f"discard: {said}: f()"]
+        assert client.send("f()\n") == [f"discard: {said}: f()"]
 
 
-def test_questions_are_answered_from_what_the_robot_tells_and_what_was_answered_since(client, control, robot):
+def test_state_questions_count_statements_since_the_last_io(client, control, robot):
     asked = ("statelastinterpreted", "statelastexecuted", "statelastcleared", "stateunexecuted")
-    numbers = [client.say(question + "\n") for question in asked]
+    numbers = [client.send(question + "\n") for question in asked]
     assert numbers == [[f"state: {n}: {question}"] for n, question in zip((9, 7, 4, 2), asked, strict=True)]
     assert not control.commands
     control.reply = Accepted(id=10)
-    heard = client.say("def f():\nstateunexecuted\n\n \r\nstatelastinterpreted\n")  # which opens no block
+    heard = client.send("def f():\nstateunexecuted\n\n \r\nstatelastinterpreted\n")  # which opens no block
     assert heard == ["ack: 10: def f():", "state: 3: stateunexecuted", "state: 10: statelastinterpreted"]
     control.reply = Done()
-    assert client.say("skipbuffer\nstateunexecuted\n")[1] == "state: 0: stateunexecuted"
+    assert client.send("skipbuffer\nstateunexecuted\n")[1] == "state: 0: stateunexecuted"
     robot.programs.io(io(interpreter=Interpreter(interpreted=10, executed=8, waiting=2)))
-    assert client.say("stateunexecuted\n") == ["state: 2: stateunexecuted"]
+    assert client.send("stateunexecuted\n") == ["state: 2: stateunexecuted"]
     control.reply = Accepted(id=1)  # of another program
-    assert client.say("f()\nstateunexecuted\n")[1] == "state: 1: stateunexecuted"
+    assert client.send("f()\nstateunexecuted\n")[1] == "state: 1: stateunexecuted"
     robot.programs.io(io())
-    assert client.say("stateunexecuted\n") == ["state: 0: stateunexecuted"]
+    assert client.send("stateunexecuted\n") == ["state: 0: stateunexecuted"]
 
 
-def test_commands_skip_what_waits_or_what_moves(client, control):
-    assert client.say("skipbuffer\nabort\n") == ["ack: 9: skipbuffer", "ack: 9: abort"]
+def test_skipbuffer_and_abort_skip_statements_or_the_move(client, control):
+    assert client.send("skipbuffer\nabort\n") == ["ack: 9: skipbuffer", "ack: 9: abort"]
     assert control.commands == [ProgramSkip(token="the-token", what=what) for what in ("statements", "move")]
 
 
-def test_statements_are_passed_on_one_after_the_other(client, control):
+def test_statements_are_sent_one_after_the_other(client, control):
     control.wait()
-    assert client.say("a = 1\nb = 2\nc = 3\n") == []
+    assert client.send("a = 1\nb = 2\nc = 3\n") == []
     assert client.session.waiting == 3
     control.answer(Accepted(id=1), keep=True)
-    assert client.say("") == ["ack: 1: a = 1"]
+    assert client.send("") == ["ack: 1: a = 1"]
     assert len(control.of(ProgramInterpret)) == 2
     client.session.closed()
     control.answer(Accepted(id=2), keep=True)
     control.answer(Accepted(id=3))
-    assert client.say("") == []
+    assert client.send("") == []
     assert [command.text for command in control.of(ProgramInterpret)] == ["a = 1", "b = 2", "c = 3"]
     assert control.left == 1
 
 
 @examples(40)
 @given(data=st.binary(max_size=300), cut=st.integers(0, 300))
-def test_no_bytes_break_it(data, cut):
-    client = Client(SimpleNamespace(programs=Programs(None, external())), FakeControl())
+def test_random_bytes_do_not_break_a_session(data, cut):
+    client = LineClient(
+        InterpreterSession, SimpleNamespace(programs=Programs(None, external())), FakeControl()
+    )
     client.session.receive(data[:cut])
     client.session.receive(data[cut:])
     client.session.receive(b"\nstateunexecuted\n")
@@ -123,7 +114,7 @@ def test_no_bytes_break_it(data, cut):
     assert all(line.decode().isprintable() for line in b"".join(client.sent).split(b"\n"))
 
 
-async def test_a_program_is_built_statement_by_statement_and_its_error_is_told_with_the_number_of_one(desk):
+async def test_statements_run_one_by_one_and_errors_have_their_number(desk):
     listener, script = await connect(desk, "primary")
     script.write(b"def main():\n  a = 5\n  interpreter_mode()\nend\n")
     await until(lambda: desk.controller.programs.state == "PLAYING")

@@ -1,4 +1,4 @@
-"""Control for clients that know no lease: one for each host, taken with the first command, given back at the end."""
+"""Control for clients without leases: one lease for each host, from its first command to its last connection."""
 
 import pytest
 
@@ -35,7 +35,7 @@ def host():
     return Host()
 
 
-def test_control_is_taken_with_the_first_change_and_given_back_with_the_last_connection(host):
+def test_control_lasts_from_the_first_change_to_the_last_connection(host):
     watcher = ConnectionControl(host.lease)
     hear(watcher.ask(c.Stop()), host.replies)
     host.answer()
@@ -52,7 +52,7 @@ def test_control_is_taken_with_the_first_change_and_given_back_with_the_last_con
         assert host.desk.holder() == holder
 
 
-def test_commands_sent_while_control_is_being_taken_go_in_their_order(host):
+def test_commands_sent_while_control_is_taken_keep_their_order(host):
     for fraction in (0.1, 0.2, 0.3):
         host.slow(fraction)
     host.answer()
@@ -60,7 +60,7 @@ def test_commands_sent_while_control_is_being_taken_go_in_their_order(host):
     assert host.desk.controller.io().target_speed_fraction == 0.3
 
 
-def test_where_somebody_else_has_control_the_refusal_comes_back_each_time(host):
+def test_commands_are_refused_while_another_client_has_control(host):
     token = host.taken_by("anna")
     assert host.connection.held_by_other
     for _ in range(2):
@@ -74,7 +74,7 @@ def test_where_somebody_else_has_control_the_refusal_comes_back_each_time(host):
     assert host.replies[-1] == Done()
 
 
-def test_control_that_was_lost_is_taken_again(host):
+def test_lost_control_is_taken_again(host):
     for fraction in (0.5, 0.4):
         host.slow(fraction)
         host.answer()
@@ -83,7 +83,7 @@ def test_control_that_was_lost_is_taken_again(host):
     assert host.kinds == ["TakeControl", "SetSpeed", "SetSpeed", "TakeControl", "SetSpeed"]
 
 
-def test_a_lease_is_kept_alive_while_there_is_one(host):
+def test_only_a_held_lease_is_renewed(host):
     host.lease.keep_alive()
     host.slow(0.5)
     host.answer()
@@ -92,7 +92,7 @@ def test_a_lease_is_kept_alive_while_there_is_one(host):
     assert host.kinds == ["TakeControl", "SetSpeed", "KeepAlive"]
 
 
-def test_control_that_somebody_holds_for_a_host_is_shared_and_not_given_back_with_the_last_connection(host):
+def test_an_adopted_lease_is_shared_and_not_released(host):
     token = host.taken_by("ur-127.0.0.1")
     host.lease.adopt(token, "the program")
     assert not host.connection.held_by_other

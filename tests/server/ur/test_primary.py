@@ -1,4 +1,4 @@
-"""The primary interface: robot state, robot messages, and the ear for commands."""
+"""The primary interface: robot state, robot messages, and commands of clients."""
 
 import struct
 from types import SimpleNamespace
@@ -14,10 +14,11 @@ from tvist_protocol import commands as c
 from tvist_protocol.programs import ProgramRun, ProgramStop
 from tvist_protocol.simulation import SimulationInject
 from tvist_protocol.stream import Event
-from tvist_server.gateways.ur import messages, version
+from tvist_server.gateways.ur import messages
 from tvist_server.gateways.ur.primary.packages import robot_state, robot_type
-from tvist_server.gateways.ur.primary.scripts import LONGEST, Intake
+from tvist_server.gateways.ur.primary.scripts import LONGEST, ScriptReader
 from tvist_server.gateways.ur.primary.session import PrimarySession
+from tvist_server.gateways.ur.version import DATE, VERSION
 
 from .decoders import message, parts, split
 from .hosts import host, told
@@ -45,7 +46,7 @@ def test_parts_lengths_and_order_are_those_of_the_recording(snapshot):
     assert len(data) == 1386
 
 
-def test_robot_mode(snapshot):
+def test_the_robot_mode_part_has_the_values_of_the_snapshot(snapshot):
     numbers = struct.unpack(">Q7?2B3dB", state_of(snapshot)[0][0])
     assert numbers[0] == round(snapshot.timestamp * 1e6)
     assert numbers[1:8] == (True, True, True, False, False, True, False)  # it has power, and moves
@@ -57,7 +58,7 @@ def flags(part):
     return struct.unpack_from(">7?", part, 8)
 
 
-def test_a_robot_without_power_in_a_protective_stop_or_with_a_paused_program_says_so(ur5e):
+def test_flags_show_power_protective_stop_and_paused_program(ur5e):
     off = state_of(ur5e(mode="POWER_OFF").tick())[0][0]
     assert flags(off)[2] is False
     assert off[15] == 3
@@ -70,7 +71,7 @@ def test_a_robot_without_power_in_a_protective_stop_or_with_a_paused_program_say
         assert flags(state_of(resting.tick())[0][0])[5:] == told_as
 
 
-def test_joints_have_the_snapshots_values(snapshot):
+def test_joint_values_are_those_of_the_snapshot(snapshot):
     columns = list(zip(*struct.iter_unpack(">3d4fB", state_of(snapshot)[0][1]), strict=True))
     for column, name in zip(columns[:3], ("actual_q", "target_q", "actual_qd"), strict=True):
         assert list(column) == getattr(snapshot, name)
@@ -80,13 +81,13 @@ def test_joints_have_the_snapshots_values(snapshot):
     assert set(columns[7]) == {253}
 
 
-def test_cartesian_and_force(snapshot):
+def test_pose_and_force_are_those_of_the_snapshot(snapshot):
     found = state_of(snapshot)[0]
     assert list(struct.unpack(">12d", found[4])) == snapshot.actual_TCP_pose + snapshot.tcp_offset
     assert list(struct.unpack(">7d", found[7]))[:6] == snapshot.actual_TCP_force
 
 
-def test_kinematics_and_configuration_are_the_descriptions(snapshot):
+def test_kinematics_and_configuration_are_those_of_the_robot_file(snapshot):
     found, limits, arm = state_of(snapshot)[0], UR5E.limits, UR5E.kinematics
     table, nothing = (*arm.a, *arm.d, *arm.alpha), (0.0,) * 6
     assert struct.unpack(">6I24dI", found[5]) == (*[2**32 - 1] * 6, *nothing, *table, 0)
@@ -99,7 +100,7 @@ def test_kinematics_and_configuration_are_the_descriptions(snapshot):
     assert numbers[55:] == (1, 3)
 
 
-def test_terminals(ur5e):
+def test_terminals_are_in_the_masterboard_and_tool_parts(ur5e):
     changes = {
         "actual_digital_input_bits": 0x20081,
         "actual_digital_output_bits": 0x10203,
@@ -145,13 +146,13 @@ def test_the_version_comes_first_and_the_first_state_at_once(robot, control, sen
     hello = message(sent[0])
     assert hello.kind == 3
     assert hello.values["name"] == "URControl"
-    assert hello.values["numbers"] == [version.MAJOR, version.MINOR, version.BUGFIX, version.BUILD]
-    assert hello.values["date"] == version.DATE
+    assert hello.values["numbers"] == [*VERSION]
+    assert hello.values["date"] == DATE
     assert interface.sample(At(snapshot, 1234)) == b""
     assert [kind for kind, _ in split(b"".join(sent[1:]))] == [16]
 
 
-def test_states_come_at_10_hz_even_where_ticks_were_left_out(robot, control, sent, snapshot):
+def test_states_are_sent_at_10_hz_even_if_ticks_are_missed(robot, control, sent, snapshot):
     interface = session(robot, control, sent.append)
     interface.sample(At(snapshot, 1))
     assert len(sent) == 1
@@ -164,7 +165,7 @@ def test_states_come_at_10_hz_even_where_ticks_were_left_out(robot, control, sen
     assert len(sent) == 1
 
 
-def test_the_safety_mode_is_told_when_it_changes_and_not_before(robot, control, sent, snapshot):
+def test_the_safety_mode_is_sent_only_when_it_changes(robot, control, sent, snapshot):
     interface = session(robot, control, sent.append)
     for tick, mode in enumerate((3, 3, 1, 1, 3, 1), start=1):
         interface.sample(At(snapshot, tick, safety_mode=mode))
@@ -172,9 +173,7 @@ def test_the_safety_mode_is_told_when_it_changes_and_not_before(robot, control, 
     assert [(one.kind, one.values["mode"]) for one in changes] == [(5, 1), (5, 3), (5, 1)]
 
 
-def test_a_protective_stop_is_error_209_of_argument_0_as_a_warning_after_the_state(
-    robot, control, sent, snapshot
-):
+def test_a_protective_stop_is_sent_as_error_209_after_the_state(robot, control, sent, snapshot):
     interface = session(robot, control, sent.append)
     interface.sample(At(snapshot, 6))
     sent.clear()
@@ -196,7 +195,7 @@ def test_clients_of_the_secondary_interface_get_the_state_and_no_messages(robot,
     assert [data[4] for data in sent] == [16, 16]
 
 
-def test_warnings_are_lines_of_the_log_and_other_events_are_not_told(robot, control, sent):
+def test_only_warnings_without_a_line_become_log_messages(robot, control, sent):
     interface = session(robot, control, sent.append)
     interface.event(Event(tick=7, kind="warning", why="for all clients, once", line=3, column=5))
     interface.event(Event(tick=7, kind="motion_started", id=1))
@@ -207,8 +206,8 @@ def test_warnings_are_lines_of_the_log_and_other_events_are_not_told(robot, cont
 
 @examples(40)
 @given(st.text(max_size=3000))
-def test_no_text_makes_a_message_that_clients_take_for_garbage(text):
-    for made in (messages.text(0, text), messages.key(0, text, text), messages.popup(0, text, text)):
+def test_messages_of_any_text_stay_below_2000_bytes(text):
+    for made in (messages.text(None, text), messages.key(None, text, text), messages.popup(None, text, text)):
         assert len(made) <= 2000
         message(made)
 
@@ -247,26 +246,26 @@ SAMPLES = [
 
 @pytest.mark.parametrize("ending", ["\n", "\r\n"])
 @pytest.mark.parametrize("sample", SAMPLES)
-def test_a_stream_is_cut_into_the_same_units_wherever_it_is_split(sample, ending):
+def test_units_do_not_depend_on_how_the_stream_is_split(sample, ending):
     stream = "".join(sample).replace("\n", ending).encode()
-    whole = Intake().feed(stream)
+    whole = ScriptReader().feed(stream)
     assert [unit.text for unit in whole] == [unit for unit in sample if unit.strip()]
     for size in (1, 2, 7):
-        intake, units = Intake(), []
+        reader, units = ScriptReader(), []
         for at in range(0, len(stream), size):
-            units += intake.feed(stream[at : at + size])
+            units += reader.feed(stream[at : at + size])
         assert units == whole
-        assert intake.held == 0
+        assert reader.held == 0
 
 
-def test_a_line_that_is_too_long_does_not_swallow_the_next():
+def test_an_overlong_line_does_not_affect_the_next_one():
     for line in (b"a" * (3 * LONGEST), b" " * (3 * LONGEST), b"#" + b"a" * (3 * LONGEST)):
-        intake = Intake()
+        reader = ScriptReader()
         units = []
         for at in range(0, len(line), 65536):
-            units += intake.feed(line[at : at + 65536])
-            assert intake.held <= LONGEST + 65536
-        units += intake.feed(b"\nstop program\n")
+            units += reader.feed(line[at : at + 65536])
+            assert reader.held <= LONGEST + 65536
+        units += reader.feed(b"\nstop program\n")
         assert [unit.words for unit in units if not unit.too_long] == ["stop program"]
         assert sum(unit.too_long for unit in units) == 1
 
@@ -283,7 +282,7 @@ ORDERS = {
 PROGRAMS = ("movej([0,0,0,0,0,0])\n", PROGRAM, "sec f():\nend\n", "power onto\n", "éß\n", "# a\n\nhalt\n")
 
 
-def test_orders_act_and_everything_else_goes_to_the_controller_as_it_was_sent(robot, control, sent):
+def test_own_commands_act_and_other_text_runs_as_a_program(robot, control, sent):
     """A simulated arm stays one."""
     interface, expected = session(robot, control, sent.append), []
     for text, commands in ORDERS.items():
@@ -296,7 +295,7 @@ def test_orders_act_and_everything_else_goes_to_the_controller_as_it_was_sent(ro
     assert not sent + robot.told
 
 
-def test_units_are_carried_out_in_their_order_each_when_the_one_before_was_answered(robot, control, sent):
+def test_units_are_carried_out_one_after_the_other_but_stop_at_once(robot, control, sent):
     interface = session(robot, control, sent.append)
     control.wait()
     interface.receive(b"def f():\nend\nstop program\nsec g():\nend\npower off\n")
@@ -323,7 +322,7 @@ REPORTS = {
 """What was sent until the connection ended, and the only line that the console is told."""
 
 
-def test_what_became_of_a_script_is_one_line_on_the_console(robot, control, sent):
+def test_the_result_of_a_script_is_one_line_on_the_console(robot, control, sent):
     for text, said in REPORTS.items():
         interface = session(robot, control, sent.append)
         interface.receive(text)
@@ -332,7 +331,7 @@ def test_what_became_of_a_script_is_one_line_on_the_console(robot, control, sent
         assert robot.reported == []
 
 
-def test_a_text_that_is_not_valid_is_told_to_everybody_and_on_the_console(robot, control, sent):
+def test_an_invalid_script_is_reported_to_all_clients_and_the_console(robot, control, sent):
     why = "compile_error_name_not_found:f:"
     control.refuse("script_error", why=why, where="text:4:3")
     session(robot, control, sent.append).receive(b"# comments\n# count\ndef g():\n  f()\nend\n")
@@ -343,7 +342,7 @@ def test_a_text_that_is_not_valid_is_told_to_everybody_and_on_the_console(robot,
 
 
 @pytest.mark.parametrize("text", ["movej(q)", "set robotmode run"])
-def test_what_cannot_be_done_now_is_a_line_of_the_log_for_who_sent_it(robot, control, sent, text):
+def test_a_command_in_the_wrong_mode_is_refused_to_its_sender(robot, control, sent, text):
     control.refuse("wrong_mode", why="the arm has no power")
     robot.latest = At(robot.latest, 1, robot_mode=3)
     session(robot, control, sent.append).receive(text.encode() + b"\n")
@@ -353,9 +352,7 @@ def test_what_cannot_be_done_now_is_a_line_of_the_log_for_who_sent_it(robot, con
 
 
 @pytest.mark.parametrize("read_only", [True, False])
-def test_without_control_or_at_a_read_only_port_commands_are_answered_with_210(
-    robot, control, sent, read_only
-):
+def test_commands_without_control_are_answered_with_error_210(robot, control, sent, read_only):
     control.refuse("no_control")
     interface = session(robot, control, sent.append, read_only=read_only)
     interface.receive(b"power off\ndef f():\n  x=1\nend\n" + (b"stop program\n" if read_only else b""))
@@ -367,7 +364,7 @@ def test_without_control_or_at_a_read_only_port_commands_are_answered_with_210(
     assert robot.reported[0].endswith(f"was refused: {why}")
 
 
-def test_what_is_so_already_is_no_failure_and_a_stop_that_cannot_be_left_yet_is_one(robot, control, sent):
+def test_changes_already_made_succeed_but_an_early_unlock_fails(robot, control, sent):
     control.refuse("wrong_mode", why="it is stopping")
     interface, snapshot = session(robot, control, sent.append), robot.latest
     for safety, kinds in ((1, []), (3, [0])):
@@ -376,6 +373,6 @@ def test_what_is_so_already_is_no_failure_and_a_stop_that_cannot_be_left_yet_is_
         assert [message(data).kind for data in sent] == kinds
 
 
-def test_the_robot_type_is_ur_s_number_of_the_model():
+def test_robot_types_are_those_of_ur():
     numbers = {"ur3e": 3, "ur5e": 1, "ur10e": 2, "ur16e": 4, "ur20": 7, "ur30": 8, "one-joint": 0}
     assert {name: robot_type(load(name)) for name in numbers} == numbers

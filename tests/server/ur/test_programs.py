@@ -1,4 +1,4 @@
-"""The controller's program at UR's interfaces: paths, what it tells clients, and who holds control for it."""
+"""The controller's program at UR's interfaces: paths, messages to clients, and control while it runs."""
 
 import pytest
 from hypothesis import given
@@ -27,7 +27,7 @@ def stopped(name, **fields):
     return Event(tick=6, kind="program_stopped", program=name, **fields)
 
 
-def test_clients_are_told_that_a_program_has_started_and_that_it_has_stopped(programs, robot):
+def test_clients_get_key_messages_when_programs_start_and_stop(programs, robot):
     for name in ("paper.urp", "there.script", "rtde_control"):
         programs.event(started(name))
         programs.event(stopped(name))
@@ -38,7 +38,7 @@ def test_clients_are_told_that_a_program_has_started_and_that_it_has_stopped(pro
     assert {(one.time, one.source) for one in told(robot)} == {(stamp, 254)}
 
 
-def test_a_label_is_told_once_when_the_program_comes_to_it(programs, robot):
+def test_a_label_is_sent_once_when_it_is_reached(programs, robot):
     for number, name in ((1, "Robot Program"), (1, "Robot Program"), (2, "Waypoint_1")):
         programs.io(
             io(program="f", program_state="PLAYING", program_label=ProgramLabel(number=number, name=name))
@@ -50,7 +50,7 @@ def test_a_label_is_told_once_when_the_program_comes_to_it(programs, robot):
     ]
 
 
-def test_a_line_that_cannot_be_carried_out_is_a_runtime_exception(programs, robot):
+def test_a_warning_with_a_line_becomes_a_runtime_exception(programs, robot):
     why = "movej: no posture reaches the pose"
     programs.event(Event(tick=5, kind="warning", why=why, line=3, column=5, program="prog"))
     programs.event(Event(tick=5, kind="warning", why="something else"))
@@ -59,7 +59,7 @@ def test_a_line_that_cannot_be_carried_out_is_a_runtime_exception(programs, robo
     assert exception.values == {"line": 3, "column": 5, "text": why}
 
 
-def test_what_programs_write_and_show_is_told_once_to_all_clients(programs, robot):
+def test_texts_and_popups_of_programs_are_sent_to_all_clients(programs, robot):
     programs.event(Event(tick=5, kind="text", why="half way", program="prog"))
     shown = {"title": "Robot", "why": "Put the part in", "level": "warning", "blocking": True}
     programs.event(Event(tick=5, kind="popup", **shown))
@@ -78,7 +78,7 @@ def run(programs, control, text="def f():\nend\n", *, secondary=False):
     return heard
 
 
-def test_a_script_is_run_with_the_control_of_its_client_which_lasts_as_long_as_it_runs(programs, control):
+def test_control_lasts_while_the_script_runs(programs, control):
     assert run(programs, control) == [None]
     assert control.commands == [ProgramRun(token="the-token", text="def f():\nend\n")]
     programs.io(io(program="f", program_state="PLAYING", program_line=1))
@@ -87,7 +87,7 @@ def test_a_script_is_run_with_the_control_of_its_client_which_lasts_as_long_as_i
     assert control.left == 1
 
 
-def test_a_script_that_replaces_another_keeps_its_own_control(programs):
+def test_a_replacing_script_keeps_its_own_control(programs):
     first, second = FakeControl(), FakeControl()
     run(programs, first)
     programs.io(io(program="f", program_state="PLAYING", program_line=1))
@@ -99,7 +99,7 @@ def test_a_script_that_replaces_another_keeps_its_own_control(programs):
     assert (first.left, second.left) == (1, 0)
 
 
-def test_control_of_a_secondary_script_lasts_until_no_secondary_script_runs(programs):
+def test_control_lasts_until_no_secondary_script_runs(programs):
     main, first, second = FakeControl(), FakeControl(), FakeControl()
     run(programs, main)
     programs.io(io(program="f", program_state="PLAYING", program_line=1))
@@ -115,7 +115,7 @@ def test_control_of_a_secondary_script_lasts_until_no_secondary_script_runs(prog
     assert (main.left, first.left, second.left) == (1, 1, 1)
 
 
-def test_a_script_that_is_refused_gives_control_back(programs, robot, control):
+def test_a_refused_script_releases_control(programs, robot, control):
     control.refuse("busy")
     (refused,) = run(programs, control)
     assert refused.code == "busy"
@@ -123,7 +123,7 @@ def test_a_script_that_is_refused_gives_control_back(programs, robot, control):
     assert not robot.told
 
 
-def test_control_is_held_as_long_as_the_program_plays(programs, control):
+def test_control_lasts_while_the_program_plays(programs, control):
     for request in (programs.load("Q2.urp", control), programs.play(control), programs.pause(control)):
         hear(request, [])
     assert control.left == 0
@@ -142,7 +142,7 @@ STEPS = st.lists(
 
 @examples(40)
 @given(STEPS)
-def test_whatever_happens_each_request_is_answered_once(steps):
+def test_each_program_request_is_answered_once(steps):
     class Bare:
         latest = None
         tell = staticmethod(message)

@@ -1,4 +1,4 @@
-"""The real-time interface: 1220 bytes a tick, as UR's description lays them out."""
+"""The real-time interface: 1220 bytes a tick in UR's documented layout."""
 
 import struct
 
@@ -28,7 +28,7 @@ def doubles(data: bytes):
     return struct.unpack(">152d", data[4:])
 
 
-def test_every_value_stands_where_the_description_has_it_to_the_last_bit(snapshots):
+def test_values_are_at_their_documented_places(snapshots):
     for snapshot in snapshots[::10]:
         values = doubles(package(snapshot))
         reserved = set(range(152))
@@ -41,14 +41,14 @@ def test_every_value_stands_where_the_description_has_it_to_the_last_bit(snapsho
         assert {values[number] for number in reserved} == {0.0}
 
 
-def test_joints_that_are_not_there_are_zero(ur5e):
+def test_missing_joints_are_zero(ur5e):
     arm = cut(4)
     values = doubles(package(ur5e(arm, q=arm.poses["Q3"]).tick()))
     assert any(values[31:35])
     assert values[35:37] == (0.0, 0.0)
 
 
-def test_the_read_only_port_hears_nothing(robot, control):
+def test_the_read_only_port_ignores_input(robot, control):
     interface = RealtimeSession(host(robot), control, pytest.fail, read_only=True)
     interface.receive(b"power off\ndef f():\nend\n" + bytes(range(256)))
     assert not control.commands

@@ -1,4 +1,4 @@
-"""RTDE's variables: names, types, values, and packages of them."""
+"""RTDE variables: names, types, values and packages."""
 
 import struct
 from pathlib import Path
@@ -9,11 +9,10 @@ from hypothesis import strategies as st
 from tests.controller.robots import UR5E, cut
 from tests.examples import examples
 
-from tvist_server.gateways.ur.rtde.inputs import INPUTS
-from tvist_server.gateways.ur.rtde.outputs import OUTPUTS, PARTS
 from tvist_server.gateways.ur.rtde.package_encoder import PackageEncoder
 from tvist_server.gateways.ur.rtde.recipes import InputRecipe, OutputRecipe, split
 from tvist_server.gateways.ur.rtde.table import page
+from tvist_server.gateways.ur.rtde.variables import INPUTS, OUTPUTS, PARTS
 from tvist_server.rtde.wire import WireType
 
 from . import rtde_client as client
@@ -55,7 +54,7 @@ def sent_inputs(draw):
     return names, [draw(NUMBERS[client.INPUT_TYPES[name]]) for name in names]
 
 
-def test_variables_and_their_types_are_the_published_ones_and_our_own():
+def test_variables_have_their_published_types():
     assert {name: wire.name for name, wire in OUTPUTS.items()} == client.OUTPUT_TYPES | client.OWN
     assert {name: wire.name for name, wire in INPUTS.items()} == client.INPUT_TYPES
     for wire in WireType:
@@ -66,7 +65,7 @@ def test_variables_and_their_types_are_the_published_ones_and_our_own():
 @examples(40)
 @given(names_of_outputs)
 @example(names=sorted(client.OUTPUT_TYPES))
-def test_a_package_holds_the_values_of_the_snapshot(snapshots, names):
+def test_a_package_has_the_values_of_the_snapshot(snapshots, names):
     """Also of all variables at once, whose names are longer than the 2048 bytes that are documented."""
     snapshot = snapshots[17]
     recipe = OutputRecipe(tuple(names))
@@ -81,7 +80,7 @@ def test_a_package_holds_the_values_of_the_snapshot(snapshots, names):
 
 @examples(40)
 @given(st.lists(st.tuples(st.integers(0, 3), st.none() | names_of_outputs), min_size=1, max_size=12))
-def test_who_else_reads_what_changes_nothing(snapshots, changes):
+def test_recipes_of_other_clients_change_nothing(snapshots, changes):
     board, recipes = PackageEncoder(), {}
     for snapshot, (number, names) in zip(snapshots, changes, strict=False):
         if names is None:
@@ -94,7 +93,7 @@ def test_who_else_reads_what_changes_nothing(snapshots, changes):
             assert board.package(recipe, snapshot, b"\x01") == alone(recipe.names, snapshot)
 
 
-def test_a_variable_that_cannot_be_written_ends_only_those_who_read_it(ur5e, monkeypatch):
+def test_a_failing_variable_affects_only_its_readers(ur5e, monkeypatch):
     robot, board = ur5e(), PackageEncoder()
     sound, faulty = OutputRecipe(("actual_q", "timestamp")), OutputRecipe(("actual_momentum",))
     board.begin("one", sound)
@@ -111,7 +110,7 @@ def test_a_variable_that_cannot_be_written_ends_only_those_who_read_it(ur5e, mon
     assert board.package(sound, now, b"\x01") == alone(sound.names, now)
 
 
-def test_what_is_read_only_when_io_changes_depends_on_nothing_else(snapshots):
+def test_values_cached_by_io_depend_only_on_io(snapshots):
     early, late = snapshots[3], snapshots[90]
     assert early.io is late.io
     for name, (part, _) in PARTS.items():
@@ -120,7 +119,7 @@ def test_what_is_read_only_when_io_changes_depends_on_nothing_else(snapshots):
 
 @examples(40)
 @given(st.lists(st.dictionaries(st.sampled_from(sorted(BANKS)), st.integers(0, 47)), max_size=6), st.data())
-def test_registers_are_those_of_the_tick_however_they_change(ur5e_at_rest, changes, data):
+def test_registers_are_those_of_the_tick(ur5e_at_rest, changes, data):
     robot, registers = ur5e_at_rest, [name for name in client.OUTPUT_TYPES if "_register" in name]
     names = data.draw(st.lists(st.sampled_from(registers), min_size=1, max_size=20))
     present = {name: getattr(robot.io, name) for name in robot.io.__struct_fields__}
@@ -136,7 +135,7 @@ def test_registers_are_those_of_the_tick_however_they_change(ur5e_at_rest, chang
 
 
 @pytest.mark.parametrize("joints", [1, 6])
-def test_vectors_have_six_entries_however_few_the_arm_has(ur5e, joints):
+def test_vectors_have_six_entries_for_any_number_of_joints(ur5e, joints):
     arm = UR5E if joints == 6 else cut(joints)
     snapshot = ur5e(arm, q=arm.poses["Q3"]).tick()
     names = ["joint_mode", "actual_q", "elbow_position", "timestamp"]
@@ -153,9 +152,7 @@ def test_a_recipe_beyond_the_largest_package_is_not_valid():
 
 @examples(40)
 @given(sent_inputs(), st.integers(0, 400), st.binary(max_size=60))
-def test_inputs_come_out_as_they_were_sent_and_of_a_package_of_the_wrong_size_the_whole_ones(
-    sent, kept, extra
-):
+def test_inputs_are_decoded_as_far_as_the_package_goes(sent, kept, extra):
     names, values = sent
     ((_, payload),) = client.packages(client.data(1, names, values))
     recipe = InputRecipe(tuple(names))
@@ -172,14 +169,14 @@ def test_inputs_come_out_as_they_were_sent_and_of_a_package_of_the_wrong_size_th
 
 @examples(40)
 @given(st.lists(st.text(st.characters(codec="ascii", exclude_characters=","), min_size=1), max_size=20))
-def test_names_are_split_at_commas_with_or_without_one_at_the_end(names):
+def test_names_are_split_at_commas(names):
     text = ",".join(names).encode()
     assert split(text) == tuple(name.strip() for name in names)
     if names:
         assert split(text + b",") == split(text)
 
 
-def test_the_page_of_variables_is_up_to_date():
+def test_the_reference_page_of_variables_is_up_to_date():
     assert PAGE.read_text(encoding="utf-8") == page(), (
         f"run `python -m tvist_server.gateways.ur.rtde.table > {PAGE.relative_to(PAGE.parents[2])}`"
     )

@@ -1,4 +1,4 @@
-"""RTDE's connections: set-up, samples, inputs and who owns them."""
+"""RTDE connections: set-up, samples, inputs and their owners."""
 
 import struct
 from collections import defaultdict
@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 
 from tvist_protocol.commands import SetSpeed
 from tvist_protocol.io import Registers, SetIo, SetRegisters
-from tvist_server.gateways.ur import version
 from tvist_server.gateways.ur.robot import InputOwners
-from tvist_server.gateways.ur.rtde.inputs import matching
 from tvist_server.gateways.ur.rtde.package_encoder import PackageEncoder
 from tvist_server.gateways.ur.rtde.session import RtdeSession, ticks_between
+from tvist_server.gateways.ur.rtde.variables import matching
+from tvist_server.gateways.ur.version import VERSION
 
 from . import rtde_client as client
 from .conftest import io
@@ -31,7 +31,7 @@ class Client:
     def __init__(self, robot, control):
         self.control = control
         self.stream = bytearray()
-        self.session = RtdeSession(robot, control, self.stream.extend, robot.boards)
+        self.session = RtdeSession(robot, control, self.stream.extend, robot.encoders)
         self.session.opened()
 
     def say(self, *packages):
@@ -69,7 +69,7 @@ class Client:
 
 @pytest.fixture
 def robot(robot):
-    robot.inputs, robot.boards = InputOwners(), defaultdict(PackageEncoder)
+    robot.inputs, robot.encoders = InputOwners(), defaultdict(PackageEncoder)
     return robot
 
 
@@ -83,120 +83,126 @@ def other(robot, control):
     return Client(robot, control)
 
 
-class TestSetUp:
-    def test_versions_one_and_two_are_spoken_and_no_others(self, one):
-        for payload in (*(struct.pack(">H", number) for number in range(5)), b"", b"\x00"):
-            spoken = payload in {b"\x00\x01", b"\x00\x02"}
-            assert one.say(client.package("V", payload)) == [("V", YES if spoken else NO)]
-        numbers = (version.MAJOR, version.MINOR, version.BUGFIX, version.BUILD)
-        assert one.say(client.package("v")) == [("v", struct.pack(">4I", *numbers))]
-        assert numbers[:2] == (5, 22)
-
-    def test_outputs_are_answered_with_their_types_and_without_valid_ones_nothing_starts(self, one):
-        one.say(client.version(), client.inputs(ints[:1]))
-        assert one.say(client.package("S")) == [("S", NO)]
-        assert one.say(client.outputs(["timestamp", "nonsense"])) == [("O", b"\x00DOUBLE,NOT_FOUND")]
-        assert one.say(client.package("S")) == [("S", NO)]
-        names = ["timestamp", "actual_q", "joint_mode", "runtime_state", "output_bit_register_64"]
-        expected = b"\x01DOUBLE,VECTOR6D,VECTOR6INT32,UINT32,BOOL"
-        assert one.say(client.outputs(names), client.package("S")) == [("O", expected), ("S", YES)]
-
-    def test_inputs_are_numbered_in_order_and_wrong_ones_take_no_number(self, one):
-        one.say(client.version())
-        assert one.say(client.inputs(ints[:1])) == [("I", b"\x01INT32")]
-        assert one.say(client.inputs([ints[1], "nonsense"])) == [("I", b"\x00INT32,NOT_FOUND")]
-        assert one.say(client.inputs([])) == [("I", b"\x00")]
-        numbers = [one.say(client.inputs(ints[:1]))[0][1][0] for _ in range(256)]
-        assert numbers == [*range(2, 256), 0, 0]  # a byte numbers no more
-
-    def test_nothing_is_said_unasked_before_the_start(self, one, snapshot):
-        one.say(client.version())
-        wrong = [client.package("U", b"\x09abc"), *map(client.package, "U?M")]
-        assert one.say(*wrong) == []
-        assert one.session.sample(snapshot) == b""
-
-    def test_ten_thousand_names_are_answered_as_far_as_one_package_goes(self, one):
-        one.say(client.version())
-        ((letter, payload),) = one.say(client.package("I", b"a," * 10_000))
-        assert (letter, payload[0]) == ("I", 0)
-        assert payload[1:].decode().split(",") == ["NOT_FOUND"] * ((0xFFFF - 4 + 1) // 10)
-
-    def test_in_version_one_names_types_and_texts_come_alone(self, one, snapshot):
-        assert one.say(client.package("O", b"timestamp,nonsense")) == [("O", b"DOUBLE,NOT_FOUND")]
-        assert one.say(client.package("O", b"timestamp,actual_q")) == [("O", b"DOUBLE,VECTOR6D")]
-        assert one.say(client.package("S")) == [("S", YES)]
-        found = client.decoded(one.session.sample(snapshot), ["timestamp", "actual_q"], version=1)
-        assert found == {"timestamp": snapshot.timestamp, "actual_q": snapshot.actual_q}
-        assert one.say(client.package("U", b"\x05")) == [("M", b"\x02there is no input recipe 5")]
+def test_only_protocol_versions_1_and_2_are_accepted(one):
+    for payload in (*(struct.pack(">H", number) for number in range(5)), b"", b"\x00"):
+        spoken = payload in {b"\x00\x01", b"\x00\x02"}
+        assert one.say(client.package("V", payload)) == [("V", YES if spoken else NO)]
+    assert one.say(client.package("v")) == [("v", struct.pack(">4I", *VERSION))]
+    assert VERSION[:2] == (5, 22)
 
 
-class TestSamples:
-    @pytest.mark.parametrize("frequency", [500, 125, 5])
-    def test_time_between_samples_is_the_periods_to_the_last_tick(self, one, snapshots, frequency):
-        one.started(frequency=frequency)
-        samples = [sample for sample in map(one.session.sample, snapshots) if sample]
-        times = [client.decoded(sample, ["timestamp"])["timestamp"] for sample in samples]
-        assert times[0] == snapshots[0].timestamp
-        assert len(times) == -(-100 * frequency // 500)
-        assert np.diff(times) == pytest.approx(1.0 / frequency, abs=1e-9)
-
-    @given(st.floats() | st.integers(1, 500))
-    def test_a_frequency_is_rounded_up_to_the_next_there_is(self, frequency):
-        ticks = ticks_between(frequency)
-        assert 1 <= ticks <= 500
-        if 1 <= frequency <= 500:
-            assert 500 / (ticks + 1) < frequency <= 500 / ticks + 1e-9
-
-    def test_ticks_that_nobody_showed_do_not_move_the_others(self, one, snapshots):
-        one.started(["control_step"], frequency=50)
-        shown = [s for k, s in enumerate(snapshots) if k not in {10, 11, 12, 30}]
-        samples = [sample for sample in map(one.session.sample, shown) if sample]
-        ticks = [client.decoded(sample, ["control_step"])["control_step"] for sample in samples]
-        steps = [tick - snapshots[0].state.tick for tick in ticks]
-        assert steps == [0, 13, 20, 31, 40, 50, 60, 70, 80, 90]
-
-    def test_samples_end_with_a_pause_and_go_on_with_the_newest_recipe(self, one, snapshots):
-        one.started()
-        assert one.session.sample(snapshots[0])
-        assert one.say(client.package("P")) == [("P", YES)]
-        assert not any(map(one.session.sample, snapshots[1:20]))
-        assert one.say(client.package("S")) == [("S", YES)]
-        assert client.decoded(one.session.sample(snapshots[20]), ["timestamp"])
-        one.say(client.outputs(["robot_mode"]))
-        assert client.decoded(one.session.sample(snapshots[25]), ["robot_mode"]) == {"robot_mode": 7}
+def test_outputs_start_only_with_a_valid_recipe(one):
+    one.say(client.version(), client.inputs(ints[:1]))
+    assert one.say(client.package("S")) == [("S", NO)]
+    assert one.say(client.outputs(["timestamp", "nonsense"])) == [("O", b"\x00DOUBLE,NOT_FOUND")]
+    assert one.say(client.package("S")) == [("S", NO)]
+    names = ["timestamp", "actual_q", "joint_mode", "runtime_state", "output_bit_register_64"]
+    expected = b"\x01DOUBLE,VECTOR6D,VECTOR6INT32,UINT32,BOOL"
+    assert one.say(client.outputs(names), client.package("S")) == [("O", expected), ("S", YES)]
 
 
-class TestOwnership:
-    def test_a_variable_belongs_to_one_connection_until_that_is_closed(self, one, other, robot, control):
-        one.with_inputs(ints[:3], ints[:3])  # as many recipes of its own as it likes
-        one.say(client.inputs([ints[4], "nonsense"]))  # a wrong recipe owns nothing
-        other.say(client.version())
-        assert other.say(client.inputs([ints[4], ints[1]])) == [("I", b"\x00INT32,IN_USE")]
-        assert other.say(client.inputs(ints[3:5])) == [("I", b"\x01INT32,INT32")]
-        one.session.closed()
-        third = Client(robot, control)
-        third.say(client.version())
-        assert third.say(client.inputs(ints[2:4])) == [("I", b"\x00INT32,IN_USE")]
-        assert third.say(client.inputs(ints[:3])) == [("I", b"\x01INT32,INT32,INT32")]
+def test_input_recipes_are_numbered_and_invalid_ones_are_not(one):
+    one.say(client.version())
+    assert one.say(client.inputs(ints[:1])) == [("I", b"\x01INT32")]
+    assert one.say(client.inputs([ints[1], "nonsense"])) == [("I", b"\x00INT32,NOT_FOUND")]
+    assert one.say(client.inputs([])) == [("I", b"\x00")]
+    numbers = [one.say(client.inputs(ints[:1]))[0][1][0] for _ in range(256)]
+    assert numbers == [*range(2, 256), 0, 0]  # a byte numbers no more
 
-    def test_speed_and_outputs_are_in_use_while_somebody_else_has_control(self, one, control):
-        one.say(client.version())
-        control.held_by_other = True
-        names = ["speed_slider_mask", "tool_digital_output", "standard_analog_output_0", ints[0]]
-        assert one.say(client.inputs(names)) == [("I", b"\x00IN_USE,IN_USE,IN_USE,INT32")]
-        assert one.say(client.inputs([ints[0], "external_force_torque"])) == [("I", b"\x01INT32,VECTOR6D")]
-        control.held_by_other = False
-        assert one.say(client.inputs(names))[0][1][0] == 2
 
-    def test_no_client_owns_what_is_reserved_and_clients_that_go_free_none_of_it(self, one, other, robot):
-        reserved = matching(["speed_slider_*", "input_int_register_[0-9]"])
-        assert set(reserved) == {*SPEED, *ints[:10]}
-        robot.inputs.take(reserved, "a fieldbus")
-        for client_ in (one, other):
-            client_.say(client.version())
-            wanted = ["speed_slider_mask", "standard_digital_output", ints[9], ints[10]]
-            assert client_.say(client.inputs(wanted)) == [("I", b"\x00IN_USE,UINT8,IN_USE,INT32")]
-            client_.session.closed()
+def test_nothing_is_sent_before_the_start(one, snapshot):
+    one.say(client.version())
+    wrong = [client.package("U", b"\x09abc"), *map(client.package, "U?M")]
+    assert one.say(*wrong) == []
+    assert one.session.sample(snapshot) == b""
+
+
+def test_an_overlong_recipe_is_answered_in_one_package(one):
+    one.say(client.version())
+    ((letter, payload),) = one.say(client.package("I", b"a," * 10_000))
+    assert (letter, payload[0]) == ("I", 0)
+    assert payload[1:].decode().split(",") == ["NOT_FOUND"] * ((0xFFFF - 4 + 1) // 10)
+
+
+def test_version_1_has_no_recipe_ids_and_text_sources(one, snapshot):
+    assert one.say(client.package("O", b"timestamp,nonsense")) == [("O", b"DOUBLE,NOT_FOUND")]
+    assert one.say(client.package("O", b"timestamp,actual_q")) == [("O", b"DOUBLE,VECTOR6D")]
+    assert one.say(client.package("S")) == [("S", YES)]
+    found = client.decoded(one.session.sample(snapshot), ["timestamp", "actual_q"], version=1)
+    assert found == {"timestamp": snapshot.timestamp, "actual_q": snapshot.actual_q}
+    assert one.say(client.package("U", b"\x05")) == [("M", b"\x02there is no input recipe 5")]
+
+
+@pytest.mark.parametrize("frequency", [500, 125, 5])
+def test_samples_are_one_period_apart(one, snapshots, frequency):
+    one.started(frequency=frequency)
+    samples = [sample for sample in map(one.session.sample, snapshots) if sample]
+    times = [client.decoded(sample, ["timestamp"])["timestamp"] for sample in samples]
+    assert times[0] == snapshots[0].timestamp
+    assert len(times) == -(-100 * frequency // 500)
+    assert np.diff(times) == pytest.approx(1.0 / frequency, abs=1e-9)
+
+
+@given(st.floats() | st.integers(1, 500))
+def test_a_frequency_is_rounded_up_to_a_divisor(frequency):
+    ticks = ticks_between(frequency)
+    assert 1 <= ticks <= 500
+    if 1 <= frequency <= 500:
+        assert 500 / (ticks + 1) < frequency <= 500 / ticks + 1e-9
+
+
+def test_missed_ticks_do_not_shift_later_samples(one, snapshots):
+    one.started(["control_step"], frequency=50)
+    shown = [s for k, s in enumerate(snapshots) if k not in {10, 11, 12, 30}]
+    samples = [sample for sample in map(one.session.sample, shown) if sample]
+    ticks = [client.decoded(sample, ["control_step"])["control_step"] for sample in samples]
+    steps = [tick - snapshots[0].state.tick for tick in ticks]
+    assert steps == [0, 13, 20, 31, 40, 50, 60, 70, 80, 90]
+
+
+def test_samples_pause_and_resume_with_the_newest_recipe(one, snapshots):
+    one.started()
+    assert one.session.sample(snapshots[0])
+    assert one.say(client.package("P")) == [("P", YES)]
+    assert not any(map(one.session.sample, snapshots[1:20]))
+    assert one.say(client.package("S")) == [("S", YES)]
+    assert client.decoded(one.session.sample(snapshots[20]), ["timestamp"])
+    one.say(client.outputs(["robot_mode"]))
+    assert client.decoded(one.session.sample(snapshots[25]), ["robot_mode"]) == {"robot_mode": 7}
+
+
+def test_an_input_belongs_to_one_connection_until_it_closes(one, other, robot, control):
+    one.with_inputs(ints[:3], ints[:3])  # as many recipes of its own as it likes
+    one.say(client.inputs([ints[4], "nonsense"]))  # a wrong recipe owns nothing
+    other.say(client.version())
+    assert other.say(client.inputs([ints[4], ints[1]])) == [("I", b"\x00INT32,IN_USE")]
+    assert other.say(client.inputs(ints[3:5])) == [("I", b"\x01INT32,INT32")]
+    one.session.closed()
+    third = Client(robot, control)
+    third.say(client.version())
+    assert third.say(client.inputs(ints[2:4])) == [("I", b"\x00INT32,IN_USE")]
+    assert third.say(client.inputs(ints[:3])) == [("I", b"\x01INT32,INT32,INT32")]
+
+
+def test_speed_and_outputs_are_in_use_while_another_client_has_control(one, control):
+    one.say(client.version())
+    control.held_by_other = True
+    names = ["speed_slider_mask", "tool_digital_output", "standard_analog_output_0", ints[0]]
+    assert one.say(client.inputs(names)) == [("I", b"\x00IN_USE,IN_USE,IN_USE,INT32")]
+    assert one.say(client.inputs([ints[0], "external_force_torque"])) == [("I", b"\x01INT32,VECTOR6D")]
+    control.held_by_other = False
+    assert one.say(client.inputs(names))[0][1][0] == 2
+
+
+def test_reserved_inputs_are_in_use_for_every_client(one, other, robot):
+    reserved = matching(["speed_slider_*", "input_int_register_[0-9]"])
+    assert set(reserved) == {*SPEED, *ints[:10]}
+    robot.inputs.take(reserved, "a fieldbus")
+    for client_ in (one, other):
+        client_.say(client.version())
+        wanted = ["speed_slider_mask", "standard_digital_output", ints[9], ints[10]]
+        assert client_.say(client.inputs(wanted)) == [("I", b"\x00IN_USE,UINT8,IN_USE,INT32")]
+        client_.session.closed()
 
 
 def shown(robot, **changes):
@@ -252,12 +258,12 @@ WRITTEN = {
 
 
 @pytest.mark.parametrize("case", WRITTEN)
-def test_what_is_written_is_one_command_with_what_the_robot_does_not_show_yet(one, robot, case):
+def test_a_package_becomes_one_command_with_the_changed_values(one, robot, case):
     names, changes, values, command = WRITTEN[case]
     shown(robot, **changes)
     one.with_inputs(names)
     assert one.put(1, names, *values) == ([] if command is None else [command])
-    assert one.heard() == []  # no sentence comes without a start
+    assert one.heard() == []  # no why comes without a start
 
 
 @pytest.mark.parametrize(
@@ -268,76 +274,78 @@ def test_what_is_written_is_one_command_with_what_the_robot_does_not_show_yet(on
         (ANALOG, (0b11, 0, 1.5, 0.5), b"standard_analog_output_0", 1),
     ],
 )
-def test_a_value_that_cannot_be_is_left_out_and_named(one, names, values, named, commands):
+def test_an_invalid_value_is_left_out_and_reported(one, names, values, named, commands):
     one.started().with_inputs(names)
     assert len(one.put(1, names, *values)) == commands
     assert named in one.texts()[0]
 
 
-class TestRegisters:
-    def test_what_is_on_its_way_is_not_sent_again_but_its_changes_are(self, one, robot, control):
-        one.with_inputs(ints[:1])
-        control.wait()
-        sent = [one.put(1, ints[:1], value) for value in (0, 5, 5, 0)]
-        assert sent == [[], [bank("int", 0, 5)], [], [bank("int", 0, 0)]]
-        control.answer()
-        shown(robot, input_int_register=[9] + [0] * 47)
-        assert one.put(1, ints[:1], 0) == [bank("int", 0, 0)]  # somebody else has written there
-
-    def test_what_a_program_watches_is_sent_every_time(self, one, robot):
-        names = [ints[0], doubles[3], "input_bit_registers0_to_31"]
-        one.with_inputs(names)
-        one.put(1, names, 5, 1.5, 1)
-        seen = {"input_int_register": [5] + [0] * 47, "input_bit_register": [1, 0, 0, 0]}
-        seen["input_double_register"] = [0.0, 0.0, 0.0, 1.5] + [0.0] * 44
-        shown(robot, **seen)
-        assert one.put(1, names, 5, 1.5, 1) == []
-        shown(robot, watched=[ints[0]], **seen)
-        assert one.put(1, names, 5, 1.5, 1) == [bank("int", 0, 5)]
-        shown(robot, watched=["input_bit_registers0_to_31"], **seen)
-        (command,) = one.put(1, names, 5, 1.5, 1)
-        assert (command.bank, command.first, len(command.values)) == ("input_bit", 0, 32)
-
-    def test_registers_of_a_package_are_one_command_so_that_programs_see_it_as_a_whole(self, one):
-        names = [ints[0], ints[1], ints[7], doubles[0], "input_bit_register_64"]
-        one.with_inputs(names)
-        also = (
-            Registers(bank="input_int", first=7, values=(1,)),
-            Registers(bank="input_double", first=0, values=(1.0,)),
-            Registers(bank="input_bit", first=64, values=(True,)),
-        )
-        command = SetRegisters(bank="input_int", first=0, values=(1, 1), also=also)
-        assert one.put(1, names, 1, 1, 1, 1.0, True) == [command]
+def test_pending_writes_are_not_repeated(one, robot, control):
+    one.with_inputs(ints[:1])
+    control.wait()
+    sent = [one.put(1, ints[:1], value) for value in (0, 5, 5, 0)]
+    assert sent == [[], [bank("int", 0, 5)], [], [bank("int", 0, 0)]]
+    control.answer()
+    shown(robot, input_int_register=[9] + [0] * 47)
+    assert one.put(1, ints[:1], 0) == [bank("int", 0, 0)]  # somebody else has written there
 
 
-class TestControl:
-    def test_somebody_elses_control_is_respected_and_said_once(self, one, control):
-        one.started().with_inputs(SPEED)
-        control.held_by_other = True
-        for _ in range(100):
-            assert one.put(1, SPEED, 1, 0.5) == []
-        assert len(one.texts()) == 1
+def test_watched_registers_are_sent_every_time(one, robot):
+    names = [ints[0], doubles[3], "input_bit_registers0_to_31"]
+    one.with_inputs(names)
+    one.put(1, names, 5, 1.5, 1)
+    seen = {"input_int_register": [5] + [0] * 47, "input_bit_register": [1, 0, 0, 0]}
+    seen["input_double_register"] = [0.0, 0.0, 0.0, 1.5] + [0.0] * 44
+    shown(robot, **seen)
+    assert one.put(1, names, 5, 1.5, 1) == []
+    shown(robot, watched=[ints[0]], **seen)
+    assert one.put(1, names, 5, 1.5, 1) == [bank("int", 0, 5)]
+    shown(robot, watched=["input_bit_registers0_to_31"], **seen)
+    (command,) = one.put(1, names, 5, 1.5, 1)
+    assert (command.bank, command.first, len(command.values)) == ("input_bit", 0, 32)
 
-    def test_a_refusal_is_said_with_its_source(self, one, control):
-        one.started().with_inputs(SPEED)
-        control.refuse(why="not now")
-        one.put(1, SPEED, 1, 0.25)
-        assert one.heard() == [("M", b"\x07not now\x04RTDE\x02")]
 
-    def test_a_force_sensors_values_reach_a_program_also_if_they_stay_the_same(self, one, robot, control):
-        names = ("external_force_torque",)
-        one.started().with_inputs(names)
-        shown(robot, program_state="STOPPED")
-        assert one.put(1, names, (1.0,) * 6) == []  # they take no control
-        shown(robot, program="p", program_state="PLAYING")
-        for force in (1.0, 2.0, 2.0):
-            (command,) = one.put(1, names, (force,) * 6)
-            assert (command.wrench, command.token) == ((force,) * 6, "the-token")
-        assert one.texts() == []
-        control.held_by_other = True
-        assert one.put(1, names, (1.0,) * 6) == []
-        (text,) = one.texts()
-        assert b"another client has control" in text
+def test_registers_of_a_package_are_one_command(one):
+    names = [ints[0], ints[1], ints[7], doubles[0], "input_bit_register_64"]
+    one.with_inputs(names)
+    also = (
+        Registers(bank="input_int", first=7, values=(1,)),
+        Registers(bank="input_double", first=0, values=(1.0,)),
+        Registers(bank="input_bit", first=64, values=(True,)),
+    )
+    command = SetRegisters(bank="input_int", first=0, values=(1, 1), also=also)
+    assert one.put(1, names, 1, 1, 1, 1.0, True) == [command]
+
+
+def test_writing_without_control_is_reported_once(one, control):
+    one.started().with_inputs(SPEED)
+    control.held_by_other = True
+    for _ in range(100):
+        assert one.put(1, SPEED, 1, 0.5) == []
+    assert len(one.texts()) == 1
+
+
+def test_a_refusal_is_sent_with_its_source(one, control):
+    one.started().with_inputs(SPEED)
+    control.refuse(why="not now")
+    one.put(1, SPEED, 1, 0.25)
+    assert one.heard() == [("M", b"\x07not now\x04RTDE\x02")]
+
+
+def test_external_forces_are_sent_even_if_they_repeat(one, robot, control):
+    names = ("external_force_torque",)
+    one.started().with_inputs(names)
+    shown(robot, program_state="STOPPED")
+    assert one.put(1, names, (1.0,) * 6) == []  # they take no control
+    shown(robot, program="p", program_state="PLAYING")
+    for force in (1.0, 2.0, 2.0):
+        (command,) = one.put(1, names, (force,) * 6)
+        assert (command.wrench, command.token) == ((force,) * 6, "the-token")
+    assert one.texts() == []
+    control.held_by_other = True
+    assert one.put(1, names, (1.0,) * 6) == []
+    (text,) = one.texts()
+    assert b"another client has control" in text
 
 
 TWO = ["input_int_register_0", "input_double_register_1"]
@@ -348,7 +356,7 @@ CONVERSATION = [
 ]  # fmt: skip
 
 
-def test_the_stream_may_be_cut_at_every_byte(robot, control):
+def test_the_stream_may_be_split_at_any_byte(robot, control):
     whole, results = b"".join(CONVERSATION), []
     for size in (len(whole), 1, 2, 7, 64):
         robot.inputs = InputOwners()
@@ -361,6 +369,6 @@ def test_the_stream_may_be_cut_at_every_byte(robot, control):
 
 
 @pytest.mark.parametrize(("size", "swallowed"), [(0, 0), (2, 0), (200, 197)])
-def test_a_size_that_is_a_lie_swallows_what_it_promises_and_no_less_than_a_header(one, size, swallowed):
+def test_a_wrong_package_size_skips_at_least_the_header(one, size, swallowed):
     lie = struct.pack(">HB", size, ord("?"))
     assert one.say(lie, bytes(swallowed), client.version()) == [("V", YES)]

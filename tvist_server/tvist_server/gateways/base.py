@@ -85,7 +85,7 @@ class Gateway:
     """A way for clients to reach a robot and for the robot's messages to reach them; by default does nothing."""
 
     setpoints_refused = 0
-    """Number of set-points rejected before the desk: on a key with a wildcard, or too large."""
+    """Number of set-points rejected before the intake: on a key with a wildcard, or too large."""
     dropped = 0  # number of states dropped because too many were queued
     wanted_topics: Collection[Topic] = frozenset(get_args(Topic))
     """Topics that currently have a reader; messages that no gateway takes are not made. Read from any thread."""

@@ -6,7 +6,8 @@
 import contextlib
 import socket
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
+from functools import partial
 from typing import TYPE_CHECKING
 
 from tvist_controller.instruments.report import Topic
@@ -40,12 +41,9 @@ class MetricsGateway(Gateway):
         if isinstance(message, Telemetry):
             self.telemetry = message
         elif isinstance(message, Event):
-            self.count(message)
-
-    def count(self, event: Event) -> None:
-        self.events[event.kind] += 1
-        if event.kind == "warning":
-            self.warnings[event.code or ""] += 1
+            self.events[message.kind] += 1
+            if message.kind == "warning":
+                self.warnings[message.code or ""] += 1
 
     def look(self) -> None:
         """Fetch the newest state, before the figures are read."""
@@ -90,119 +88,69 @@ class Metrics(Collector):
         for robot in self._robots:
             robot.look()
         families = {"counter": CounterMetricFamily, "gauge": GaugeMetricFamily}
-        for kind, name, what, source, field in FIGURES:
-            family = families[kind](name, what, labels=LABELS)
+        for kind, name, what, label, values_of in _figures():
+            family = families[kind](f"tvist_{name}", what, labels=(*LABELS, label) if label else LABELS)
             for robot in self._robots:
-                message = getattr(robot, source)
-                if message is not None and (value := getattr(message, field)) is not None:
-                    family.add_metric(robot.labels, value)
+                for value, number in values_of(robot).items():
+                    family.add_metric((*robot.labels, value) if label else robot.labels, number)
             yield family
-        late = GaugeMetricFamily(
-            "tvist_tick_lateness_seconds",
-            "Lateness of the ticks of the last second, by `quantile`: 0.5, 0.99, and 1 for the largest.",
-            labels=(*LABELS, "quantile"),
-        )
-        for robot in [robot for robot in self._robots if robot.telemetry is not None]:
-            for quantile, field in QUANTILES.items():
-                late.add_metric((*robot.labels, quantile), getattr(robot.telemetry, field) * MICRO)
-        yield late
-        for name, what, label in (
-            ("tvist_events", "Events, by `kind`.", "kind"),
-            ("tvist_warnings", "Warnings, by `code`, which is empty for those without one.", "code"),
-        ):
-            counted = CounterMetricFamily(name, what, labels=(*LABELS, label))
-            for robot in self._robots:
-                for value, count in (robot.events if label == "kind" else robot.warnings).copy().items():
-                    counted.add_metric((*robot.labels, value), count)
-            yield counted
 
 
-FIGURES = (
-    ("counter", "tvist_ticks", "Control periods begun. If it stands still, the robot does.", "state", "tick"),
-    ("gauge", "tvist_robot_mode", "Robot mode as in RTDE: 7 is RUNNING.", "state", "robot_mode"),
-    (
-        "gauge",
-        "tvist_safety_mode",
-        "Safety mode as in RTDE: 1 is NORMAL, 3 is PROTECTIVE_STOP.",
-        "state",
-        "safety_mode",
+Figure = tuple[str, str, str, str, Callable[[MetricsGateway], Mapping[str, float]]]
+"""Type, name behind `tvist_`, meaning, name of a further label or "", and numbers of a robot by label."""
+
+
+def _figures() -> Iterator[Figure]:
+    for source, figures in FIGURES.items():
+        for kind, field, what in figures:
+            yield kind, NAMES.get(field, field), what, "", partial(_fields, source, {"": field}, 1.0)
+    what = "Lateness of the ticks of the last second, by `quantile`: 0.5, 0.99, and 1 for the largest."
+    lateness = partial(_fields, "telemetry", QUANTILES, MICRO)
+    yield "gauge", "tick_lateness_seconds", what, "quantile", lateness
+    yield "counter", "events", "Events, by `kind`.", "kind", lambda robot: robot.events.copy()
+    what = "Warnings, by `code`, which is empty for those without one."
+    yield "counter", "warnings", what, "code", lambda robot: robot.warnings.copy()
+
+
+def _fields(source: str, fields: Mapping[str, str], unit: float, of: MetricsGateway) -> dict[str, float]:
+    """Return a robot's fields of a message that are known, by their keys in `fields`."""
+    message = getattr(of, source)
+    found = {key: getattr(message, field, None) for key, field in fields.items()}
+    return {key: unit * value for key, value in found.items() if value is not None}
+
+
+FIGURES = {
+    "state": (
+        ("counter", "tick", "Control periods begun. If it stands still, the robot does."),
+        ("gauge", "robot_mode", "Robot mode as in RTDE: 7 is RUNNING."),
+        ("gauge", "safety_mode", "Safety mode as in RTDE: 1 is NORMAL, 3 is PROTECTIVE_STOP."),
     ),
-    (
-        "gauge",
-        "tvist_ticks_per_second",
-        "Control periods begun in the last second: 500 at full rate.",
-        "telemetry",
-        "ticks_per_second",
+    "telemetry": (
+        ("gauge", "ticks_per_second", "Control periods begun in the last second: 500 at full rate."),
+        ("gauge", "load", "Share of the last second that the ticks of this robot took; missing in lockstep."),
+        ("gauge", "overloaded", "1 while the robot is overloaded, otherwise 0."),
+        ("counter", "due_ticks",
+         "Control periods that were due: those begun and those left out; missing in lockstep."),
+        ("counter", "missed_ticks",
+         "Of the due control periods, those that began a period late or more, or were left out."),
+        ("counter", "commands", "Commands received."),
+        ("counter", "refused", "Commands refused."),
+        ("counter", "setpoints_received", "Set-points received."),
+        ("counter", "setpoints_refused",
+         "Set-points that belonged to no stream or were no posture of the arm."),
+        ("counter", "setpoints_late", "Set-points dropped because a newer one had been played."),
+        ("counter", "setpoints_lost", "Set-points that had not arrived when they were due."),
+        ("counter", "setpoints_limited", "Set-points that exceeded a limit and were limited."),
+        ("counter", "dropped_states", "States dropped because the network did not take them in time."),
+        ("counter", "recorder_dropped", "Messages dropped because the recorder's queue was full."),
     ),
-    (
-        "gauge",
-        "tvist_load_ratio",
-        "Share of the last second that the ticks of this robot took; missing in lockstep.",
-        "telemetry",
-        "load",
-    ),
-    ("gauge", "tvist_overloaded", "1 while the robot is overloaded, otherwise 0.", "telemetry", "overloaded"),
-    (
-        "counter",
-        "tvist_due_ticks",
-        "Control periods that were due: those begun and those left out; missing in lockstep.",
-        "telemetry",
-        "due_ticks",
-    ),
-    (
-        "counter",
-        "tvist_missed_ticks",
-        "Of the due control periods, those that began a period late or more, or were left out.",
-        "telemetry",
-        "missed_ticks",
-    ),
-    ("counter", "tvist_commands", "Commands received.", "telemetry", "commands"),
-    ("counter", "tvist_commands_refused", "Commands refused.", "telemetry", "refused"),
-    ("counter", "tvist_setpoints_received", "Set-points received.", "telemetry", "setpoints_received"),
-    (
-        "counter",
-        "tvist_setpoints_refused",
-        "Set-points that belonged to no stream or were no posture of the arm.",
-        "telemetry",
-        "setpoints_refused",
-    ),
-    (
-        "counter",
-        "tvist_setpoints_late",
-        "Set-points dropped because a newer one had been played.",
-        "telemetry",
-        "setpoints_late",
-    ),
-    (
-        "counter",
-        "tvist_setpoints_lost",
-        "Set-points that had not arrived when they were due.",
-        "telemetry",
-        "setpoints_lost",
-    ),
-    (
-        "counter",
-        "tvist_setpoints_limited",
-        "Set-points that exceeded a limit and were limited.",
-        "telemetry",
-        "setpoints_limited",
-    ),
-    (
-        "counter",
-        "tvist_states_dropped",
-        "States dropped because the network did not take them in time.",
-        "telemetry",
-        "dropped_states",
-    ),
-    (
-        "counter",
-        "tvist_recorder_dropped",
-        "Messages dropped because the recorder's queue was full.",
-        "telemetry",
-        "recorder_dropped",
-    ),
-)
-"""Type, name and meaning of each figure, the message that has it, and its field there."""
+}  # fmt: skip
+"""Type, field and meaning of each figure, by the message that has the field."""
+NAMES = {
+    "tick": "ticks", "load": "load_ratio", "refused": "commands_refused",
+    "dropped_states": "states_dropped",
+}  # fmt: skip
+"""Names of figures that are not those of their fields; each begins with `tvist_`."""
 QUANTILES = {"0.5": "late_p50_us", "0.99": "late_p99_us", "1": "late_max_us"}
 
 

@@ -85,19 +85,19 @@ class Network:
     def gateway(
         self,
         robot: str,
-        desk: CommandIntake,
+        intake: CommandIntake,
         *,
         lockstep: bool,
         truth: bool,
         wanted: Callable[[bool], None] | None = None,
     ) -> ZenohGateway:
-        """Create the gateway of a robot for its desk; in lockstep, the publisher waits so that no state is lost.
+        """Create the gateway of a robot for its intake; in lockstep, the publisher waits so that no state is lost.
 
         If `truth` is False, `wanted`, if given, is called from any thread with whether a client subscribes to
         the topic `truth`.
         """
-        gateway = self._expected.pop(robot, None) or self._added(robot, desk)
-        gateway.serve(desk, lockstep=lockstep, truth=truth, wanted=wanted)
+        gateway = self._expected.pop(robot, None) or self._added(robot, intake)
+        gateway.serve(intake, lockstep=lockstep, truth=truth, wanted=wanted)
         return gateway
 
     def expect(self, robots: Sequence[str], starting: CommandIntake, *, here: bool = True) -> None:

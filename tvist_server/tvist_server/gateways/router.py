@@ -9,8 +9,9 @@ import zenoh
 
 from tvist_client.fleet import RobotPlace, place_of
 from tvist_protocol import keys
-from tvist_server.gateways.exposure import check_endpoints, guarded_router
 from tvist_server.gateways.network import REALTIME, open_router
+from tvist_server.gateways.security import check_endpoints, router_security
+from tvist_server.option_values import count_of
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 SESSIONS = 4096  # largest number of robots, clients and routers connected at once
@@ -37,7 +38,7 @@ class Rate(NamedTuple):
         return cls(float(found[1]), found[2])
 
 
-def started(
+def start_router(
     listen: Sequence[str],
     connect: Sequence[str],
     rates: Sequence[Rate],
@@ -51,8 +52,9 @@ def started(
     May raise StartError or GatewayError.
     """
     check_endpoints("connect", connect)
-    endpoints, guard = guarded_router(listen, security=security, insecure=insecure)
-    _allow_files()
+    endpoints, guard = router_security(listen, security=security, insecure=insecure)
+    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)  # usually 1024 are set
+    resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
     limits = {"downsampling": downsampling(rates, robots)} if rates else {}
     settings = {**REALTIME, "transport/unicast/max_sessions": SESSIONS, **guard, **limits}
     return open_router(endpoints, connect, settings, security)
@@ -63,9 +65,7 @@ def robots_of(text: str) -> list[RobotPlace]:
     first, star, count = text.partition("*")
     if not star:
         return [place_of(first)]
-    number = int(count) if count.isascii() and count.isdigit() and len(count) < 9 else 0
-    if not 1 <= number <= MAX_COUNT:
-        raise ValueError(f"robot is {text!r}: the count after * must be a whole number from 1 to {MAX_COUNT}")
+    number = count_of(f"robot is {text!r}", count, MAX_COUNT)
     return [place_of(f"{first}-{each}") for each in range(1, number + 1)]
 
 
@@ -91,9 +91,3 @@ def downsampling(rates: Sequence[Rate], robots: Sequence[RobotPlace]) -> list[di
         }
         for number, rate in enumerate(rates)
     ]
-
-
-def _allow_files() -> None:
-    """Raise this process's limit of open files, usually 1024, to what the system permits."""
-    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
-    resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))

@@ -39,7 +39,7 @@ class ZenohGateway(Gateway):
     ) -> None:
         self._session = session
         self._robot = robot
-        self._desk = self._queried = starting
+        self._intake = self._queried = starting
         self._closed = False
         self.wanted_topics: set[Topic] = set()
         self._answers = Answers()
@@ -55,7 +55,7 @@ class ZenohGateway(Gateway):
 
     def serve(
         self,
-        desk: CommandIntake,
+        intake: CommandIntake,
         *,
         lockstep: bool,
         truth: bool,
@@ -63,11 +63,11 @@ class ZenohGateway(Gateway):
     ) -> None:
         """Let clients reach the robot; arguments as for `Network.gateway`."""
         session, robot = self._session, self._robot
-        self._desk = desk
+        self._intake = intake
         session.liveliness().declare_subscriber(
             keys.any_client(robot), Callback(self._on_client, indirect=False), history=True
         )
-        self._queried = desk  # it knows the clients by now
+        self._queried = intake  # it knows the clients by now
         setpoint = keys.key(robot, "setpoint")
         session.declare_subscriber(setpoint, Callback(partial(self._on_setpoint, setpoint), indirect=False))
         self._publishers = _publishers(session, robot, lockstep=lockstep, truth=truth or wanted is not None)
@@ -152,21 +152,21 @@ class ZenohGateway(Gateway):
         if str(sample.key_expr) != key or len(sample.payload) > MAX_BYTES:
             self.setpoints_refused += 1
         else:
-            self._desk.setpoint(sample.payload.to_bytes())
+            self._intake.setpoint(sample.payload.to_bytes())
 
     def _on_client(self, sample: zenoh.Sample) -> None:
         client = keys.client_of(self._robot, str(sample.key_expr))
         if self._closed or client is None:
             return
         if sample.kind == zenoh.SampleKind.PUT:
-            self._desk.client_seen(*client)
+            self._intake.client_seen(*client)
         else:
-            self._desk.client_gone(*client)
+            self._intake.client_gone(*client)
 
     def session_gone(self, session: str) -> None:
         """Note that a session has ended. Its liveliness tokens may outlast it while another session holds a copy."""
         if not self._closed:
-            self._desk.session_gone(session)
+            self._intake.session_gone(session)
 
 
 class Answers:

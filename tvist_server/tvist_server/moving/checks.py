@@ -58,7 +58,7 @@ FELL_SILENT = Halt(
 )
 
 
-class Wanted(NamedTuple):
+class Expected(NamedTuple):
     """What tvist was told about the robot."""
 
     description: RobotDescription
@@ -67,15 +67,17 @@ class Wanted(NamedTuple):
     q: tuple[float, ...] | None = None  # joint angles at which the robot should be [rad]; None: any
 
 
-def why_not_by_answers(wanted: Wanted, answers: Mapping[str, str], own: Configuration | None) -> str | None:
+def why_not_by_answers(
+    expected: Expected, answers: Mapping[str, str], own: Configuration | None
+) -> str | None:
     """Return why the answers of a robot's interfaces forbid moving it; None if they allow it."""
-    model = wanted.description.robot.model
+    model = expected.description.robot.model
     told = answers.get(MODEL)
     if told is not None and series(told) != series(model):
         return f"it is a {told}, and the robot file is that of a {model}: give --robot its model"
     if own is not None and (trouble := own.trouble()) is not None:
         return trouble
-    if own is not None and not own.is_of(wanted.description):
+    if own is not None and not own.is_of(expected.description):
         return (
             f"its dimensions are not those of a {model}: give --robot its model, or a robot file of your own"
         )
@@ -102,21 +104,23 @@ def version_trouble(version: Sequence[int]) -> str | None:
     return f"its software {own} may not run tvist's program: update it to 5.9 or later, on a CB3 robot to 3.14 or later"
 
 
-def why_not_by_state(wanted: Wanted, sight: Sight, *, may_play: bool = False) -> str | None:
+def why_not_by_state(expected: Expected, sight: Sight, *, may_play: bool = False) -> str | None:
     """Return why a robot must not be moved now, None if it may; `may_play`: the program that runs on it is ours."""
     mode, safety, runtime = sight.modes
-    if mode == RobotMode.DISCONNECTED:
-        return "it is not connected: check the network and the robot"
-    if safety != SafetyMode.NORMAL:
-        return f"its safety mode is {_name(SafetyMode, safety)}: clear that at the robot, until it is NORMAL"
-    if mode != RobotMode.RUNNING:
-        return f"its mode is {_name(RobotMode, mode)}: switch it on and release its brakes at the robot"
-    if runtime != RuntimeState.STOPPED and not may_play:
-        return "a program runs on it, or is paused: stop that at the robot or at its client"
-    return _posture_trouble(wanted, sight) or _load_trouble(wanted, sight)
+    reasons = (
+        (mode == RobotMode.DISCONNECTED, "it is not connected: check the network and the robot"),
+        (safety != SafetyMode.NORMAL,
+         f"its safety mode is {_name(SafetyMode, safety)}: clear that at the robot, until it is NORMAL"),
+        (mode != RobotMode.RUNNING,
+         f"its mode is {_name(RobotMode, mode)}: switch it on and release its brakes at the robot"),
+        (runtime != RuntimeState.STOPPED and not may_play,
+         "a program runs on it, or is paused: stop that at the robot or at its client"),
+    )  # fmt: skip
+    why = next((why for wrong, why in reasons if wrong), None)
+    return why or _posture_trouble(expected, sight) or _load_trouble(expected, sight)
 
 
-def _posture_trouble(wanted: Wanted, sight: Sight) -> str | None:
+def _posture_trouble(expected: Expected, sight: Sight) -> str | None:
     target, measured = sight.target[0], sight.measured.q
     if np.abs(sight.target[1]).max() > STILL:
         return "it moves: wait until it is at rest"
@@ -126,12 +130,12 @@ def _posture_trouble(wanted: Wanted, sight: Sight) -> str | None:
             f"joint {joint} is {by:.3f} rad from where its controller has it, more than {MAX_JOINT_DIFFERENCE:g}: "
             "remove what holds it, or switch its power off and on"
         )
-    if wanted.q is not None and (joint := _apart(np.array(wanted.q), target)) is not None:
+    if expected.q is not None and (joint := _apart(np.array(expected.q), target)) is not None:
         return (
-            f"joint {joint} stands at {target[joint]:.3f} rad, and --start says {wanted.q[joint]:.3f}: move the arm "
+            f"joint {joint} stands at {target[joint]:.3f} rad, and --start says {expected.q[joint]:.3f}: move the arm "
             "there, or leave --start out"
         )
-    most = np.array(wanted.description.limits.position)
+    most = np.array(expected.description.limits.position)
     beyond = int(np.argmax(np.abs(target) - most))
     if abs(target[beyond]) > most[beyond]:
         return (
@@ -141,18 +145,18 @@ def _posture_trouble(wanted: Wanted, sight: Sight) -> str | None:
     return None
 
 
-def _load_trouble(wanted: Wanted, sight: Sight) -> str | None:
+def _load_trouble(expected: Expected, sight: Sight) -> str | None:
     told, tool = sight.payload, sight.tool
-    if told is not None and abs(told.mass - wanted.payload.mass) > SAME_MASS:
+    if told is not None and abs(told.mass - expected.payload.mass) > SAME_MASS:
         return (
-            f"it was told a payload of {told.mass:.3g} kg, and here it is {wanted.payload.mass:.3g} kg: give --payload "
-            "what the arm carries, and tell the robot the same"
+            f"it was told a payload of {told.mass:.3g} kg, and here it is {expected.payload.mass:.3g} kg: give "
+            "--payload what the arm carries, and tell the robot the same"
         )
-    if tool is not None and wanted.tool is not None:
-        apart = np.abs(np.array(tool) - np.array(wanted.tool))
+    if tool is not None and expected.tool is not None:
+        apart = np.abs(np.array(tool) - np.array(expected.tool))
         if apart[:3].max() > SAME_PLACE or apart[3:].max() > SAME_TURN:
             return (
-                f"its tool centre point is {_listed(tool)}, and --tcp says {_listed(wanted.tool)}: set the right one "
+                f"its tool centre point is {_listed(tool)}, and --tcp says {_listed(expected.tool)}: set the right one "
                 "at the robot, or leave --tcp out to take over its own"
             )
     return None

@@ -28,7 +28,7 @@ class NoAnswerError(Exception):
     """An interface does not answer; the message names it and gives the reason."""
 
 
-def ask(place: RobotAddress, question: bytes, answer: Callable[[bytes], T | None]) -> T:
+def query(place: RobotAddress, question: bytes, answer: Callable[[bytes], T | None]) -> T:
     """Return an interface's answer, parsed by `answer` (None: more must come); NoAnswerError after `PATIENCE`."""
     heard, ends = b"", time.monotonic() + PATIENCE
     try:
@@ -48,7 +48,7 @@ def ask(place: RobotAddress, question: bytes, answer: Callable[[bytes], T | None
     raise NoAnswerError(f"port {place.port} of {place.host} gives no answer within {PATIENCE:g} s")
 
 
-def asked(place: RobotAddress, questions: Sequence[str]) -> dict[str, str]:
+def query_dashboard(place: RobotAddress, questions: Sequence[str]) -> dict[str, str]:
     """Return the answers by question, without those that it does not understand; empty if there is no dashboard."""
     text = "".join(f"{question}\n" for question in (*questions, "quit")).encode()
 
@@ -61,7 +61,7 @@ def asked(place: RobotAddress, questions: Sequence[str]) -> dict[str, str]:
         return {question: short(line.strip()) for question, line in found if _UNKNOWN not in line}
 
     try:
-        return ask(place.beside(DASHBOARD), text, answers)
+        return query(place.beside(DASHBOARD), text, answers)
     except NoAnswerError:
         return {}
 
@@ -100,12 +100,12 @@ class Configuration(NamedTuple):
 def configuration_of(place: RobotAddress) -> Configuration | None:
     """Ask a robot for its configuration; None if it does not report one."""
     try:
-        return ask(place.beside(PRIMARY), b"", found)
+        return query(place.beside(PRIMARY), b"", configuration_in)
     except NoAnswerError:
         return None
 
 
-def found(heard: bytes) -> Configuration | None:
+def configuration_in(heard: bytes) -> Configuration | None:
     """Return the configuration in the data of a primary interface; None if it has not arrived yet."""
     try:
         for package in _split(heard, _PACKAGE, STATE):
@@ -136,7 +136,7 @@ def _read(part: bytes) -> Configuration:
     return Configuration(position[:, 0], position[:, 1], motion[:, 0], motion[:, 1], a, d, alpha)
 
 
-def narrowed(
+def narrow_limits(
     description: RobotDescription, configuration: Configuration | None, speed_cap: float
 ) -> RobotDescription:
     """Return the robot file with limits no wider than the robot reports, and with no velocity above the cap [rad/s]."""

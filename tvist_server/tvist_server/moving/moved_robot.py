@@ -15,14 +15,14 @@ from tvist_protocol.modes import RuntimeState, SafetyMode
 from tvist_server.moving.checks import (
     FELL_SILENT,
     QUESTIONS,
-    Wanted,
+    Expected,
     mounting_trouble,
     tells_gravity,
     version_trouble,
     why_not_by_answers,
     why_not_by_state,
 )
-from tvist_server.moving.interfaces import asked, configuration_of, narrowed
+from tvist_server.moving.interfaces import configuration_of, narrow_limits, query_dashboard
 from tvist_server.moving.program import INPUTS, OUTPUTS
 from tvist_server.moving.run import ProgramRun
 from tvist_server.moving.servo_lag import ServoLag
@@ -56,17 +56,17 @@ class MovedRobot(RealArm):
         self._sight = self._robot.first()
         self._told = [f"no joint moves faster than {speed_cap:g} rad/s (--speed-cap)"]
         own = configuration_of(place)
-        answers = asked(place, QUESTIONS)
-        file = Wanted(description, payload, tool, start)
+        answers = query_dashboard(place, QUESTIONS)
+        file = Expected(description, payload, tool, start)
         self._refuse_if(version_trouble(self._robot.version) or why_not_by_answers(file, answers, own))
-        self._wanted = file._replace(description=narrowed(description, own, speed_cap))
-        self._refuse_if(why_not_by_state(self._wanted, self._sight))
-        felt = np.mean([row["actual_tool_accelerometer"] for row in self._robot.looked_at], axis=0)
+        self._expected = file._replace(description=narrow_limits(description, own, speed_cap))
+        self._refuse_if(why_not_by_state(self._expected, self._sight))
+        felt = np.mean([row["actual_tool_accelerometer"] for row in self._robot.first_rows], axis=0)
         if tells_gravity(felt):
             self._refuse_if(mounting_trouble(description, self._sight.measured.q, felt))
         else:
             self._told.append("its accelerometer does not measure gravity: its mounting was not checked")
-        self._wanted = self._wanted._replace(q=None)  # `start` only matters before the first motion
+        self._expected = self._expected._replace(q=None)  # `start` only matters before the first motion
         if own is None:
             self._told.append("its primary interface reports no limits: only those of the robot file apply")
         if not answers:
@@ -88,14 +88,14 @@ class MovedRobot(RealArm):
         return self._robot.payload
 
     def described(self) -> RobotDescription:
-        return self._wanted.description
+        return self._expected.description
 
     def measure(self) -> Measurement:
         """Return the posture that the robot's controller holds, if it may be moved from there."""
         run = self._run
         if run is None or not run.ready:
             may_play = run is not None or self._left_paused
-            self._refuse_if(why_not_by_state(self._wanted, self._sight, may_play=may_play))
+            self._refuse_if(why_not_by_state(self._expected, self._sight, may_play=may_play))
         last = None if run is None else run.last
         return self._measured(last or self._robot.newest["target_q"])
 
@@ -144,7 +144,7 @@ class MovedRobot(RealArm):
             trouble = self._trouble()
             if trouble is None:
                 self._number += 1
-                limits = self._wanted.description.limits
+                limits = self._expected.description.limits
                 self._run = ProgramRun(
                     self._robot, self._place, self._number, limits, self._lag, self._trouble
                 )
@@ -159,7 +159,7 @@ class MovedRobot(RealArm):
         return self._pace.row(sight.tick, time.monotonic())
 
     def _trouble(self) -> str | None:
-        return why_not_by_state(self._wanted, self._sight, may_play=self._left_paused)
+        return why_not_by_state(self._expected, self._sight, may_play=self._left_paused)
 
     @property
     def condition(self) -> Condition:

@@ -13,7 +13,7 @@ from tvist_plant.plant import Halt, Sight
 from tvist_plant.robot_tables import ArmLimits
 from tvist_protocol.modes import RuntimeState
 from tvist_server.moving.checks import REMOTE, REPLACED, halt_by_modes, halt_by_program, remote_trouble
-from tvist_server.moving.interfaces import PATIENCE, PRIMARY, asked
+from tvist_server.moving.interfaces import PATIENCE, PRIMARY, query_dashboard
 from tvist_server.moving.program import (
     ALONE,
     ENDED,
@@ -155,7 +155,7 @@ class Upload:
         self._closed.set()
 
     def _run(self) -> None:
-        self.trouble = remote_trouble(asked(self._place, [REMOTE]))
+        self.trouble = remote_trouble(query_dashboard(self._place, [REMOTE]))
         if self.trouble is not None or self._closed.is_set():
             return
         where = self._place.beside(PRIMARY)

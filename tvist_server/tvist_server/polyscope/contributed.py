@@ -11,6 +11,16 @@ EXTERNAL_CONTROL = (
 )
 """Placeholder of an External Control node until the program is played; see `with_external_control`."""
 
+_LINES = {
+    "com.fzi.externalcontrol.ExternalControlNode": [EXTERNAL_CONTROL],
+    f"{_GRIPPER}GripperActivate": ["rq_activate_and_wait()"],
+    f"{_FORCE}Zero FT Sensor": ["zero_ftsensor()", "sleep(0.1)"],
+}
+_BRANCHES = {
+    f"{_GRIPPER}gripper_validation_{part}node": head
+    for part, head in (("", ""), ("if_", "if"), ("else_", "else"))
+}
+
 
 def kind_of(node: Element) -> str:
     """Return the name of a contributed node and of its URCap, for messages and `--skip`."""
@@ -20,28 +30,13 @@ def kind_of(node: Element) -> str:
 
 def lines_of(node: Element) -> list[str] | None:
     """Return the lines of a node without children; None if it cannot be translated."""
-    match node.get("strategyClass"):
-        case "com.fzi.externalcontrol.ExternalControlNode":
-            return [EXTERNAL_CONTROL]
-        case name if name == f"{_GRIPPER}GripperActivate":
-            return ["rq_activate_and_wait()"]
-        case name if name == f"{_GRIPPER}GripperNode":
-            return _move_fingers(node)
-        case name if name == f"{_FORCE}Zero FT Sensor":
-            return ["zero_ftsensor()", "sleep(0.1)"]
-    return None
+    kind = node.get("strategyClass") or ""
+    return _move_fingers(node) if kind == f"{_GRIPPER}GripperNode" else _LINES.get(kind)
 
 
 def branch_of(node: Element) -> str | None:
     """Return the head of the branch that a node of Robotiq's Grip Check is; empty for the node around its branches."""
-    match (node.get("strategyClass") or "").removeprefix(_GRIPPER):
-        case "gripper_validation_node":
-            return ""
-        case "gripper_validation_if_node":
-            return "if"
-        case "gripper_validation_else_node":
-            return "else"
-    return None
+    return _BRANCHES.get(node.get("strategyClass") or "")
 
 
 def detection(node: Element) -> str:

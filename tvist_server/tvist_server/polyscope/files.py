@@ -1,6 +1,7 @@
 """Program files: URScript, or what PolyScope saves, with the installation and the variables beside it."""
 
 import zlib
+from functools import lru_cache
 from pathlib import Path
 
 from tvist_plant.user_file import LARGEST, UserFileError, read_bytes, xml
@@ -34,7 +35,9 @@ def text_of(path: Path, data: bytes, skip: frozenset[str] = frozenset()) -> str:
     except UserFileError as error:
         raise UserFileError(f"program {path}: {error}") from error
     except UnicodeDecodeError as error:
-        raise UserFileError(f"program {path} is not text in UTF-8: byte {error.start}") from error
+        raise UserFileError(
+            f"program {path} is not text in UTF-8 at byte {error.start}: save it as UTF-8"
+        ) from error
 
 
 def unpacked(what: str, data: bytes) -> bytes:
@@ -45,9 +48,9 @@ def unpacked(what: str, data: bytes) -> bytes:
     try:
         data = unpack.decompress(data, LARGEST)
     except zlib.error as error:
-        raise UserFileError(f"{what} is packed, and cannot be unpacked: {error}") from error
+        raise UserFileError(f"{what} is packed, and cannot be unpacked: {error}; copy it again") from error
     if not (unpack.eof or unpack.unconsumed_tail):
-        raise UserFileError(f"{what} is packed, and its end is missing")
+        raise UserFileError(f"{what} is packed, and its end is missing: copy it again")
     if unpack.unconsumed_tail:
         raise UserFileError(f"{what} has more than {LARGEST >> 20} MiB when it is unpacked")
     return data
@@ -57,13 +60,18 @@ def _installation(program: Path, name: str) -> Installation:
     """Return the installation of a name beside a program or one folder above; empty if there is none."""
     for folder in program.parents[:2]:
         path = folder / f"{Path(name).name}.installation"
-        if not path.is_file():
-            continue
-        variables = path.with_suffix(".variables")
-        values = read_bytes(variables, "variables").decode(errors="replace") if variables.is_file() else ""
-        what = f"installation {path}"
-        try:
-            return Installation.of(xml(unpacked(what, read_bytes(path, "installation"))), values)
-        except ValueError as error:
-            raise UserFileError(f"{what}: {error}") from error
+        if path.is_file():
+            variables = path.with_suffix(".variables")
+            values = (
+                read_bytes(variables, "variables").decode(errors="replace") if variables.is_file() else ""
+            )
+            return _parsed(f"installation {path}", read_bytes(path, "installation"), values)
     return Installation()
+
+
+@lru_cache(maxsize=1)  # the programs of a folder share it
+def _parsed(what: str, data: bytes, variables: str) -> Installation:
+    try:
+        return Installation.of(xml(unpacked(what, data)), variables)
+    except ValueError as error:
+        raise UserFileError(f"{what}: {error}") from error

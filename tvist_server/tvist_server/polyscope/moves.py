@@ -50,7 +50,7 @@ class _Style:
 
 
 class Moves:
-    """Translates motions; `children` translates the nodes inside one."""
+    """Translates motions."""
 
     def __init__(
         self,
@@ -58,19 +58,18 @@ class Moves:
         expressions: Expressions,
         references: References,
         installation: Installation,
-        numbers_of: dict[Element, int],
-        children: Callable[[Element], None],
+        following: dict[Element | None, Element | None],  # the node behind each node
+        children: Callable[[Element], None],  # translates the nodes inside one
     ) -> None:
         self._text, self._expressions, self._references = text, expressions, references
-        self._installation, self._number, self._children = installation, numbers_of, children
+        self._installation, self._following, self._children = installation, following, children
         self._styles: list[_Style] = []
-        self.waypoints: dict[str, str] = {}
-        """Values of the variables that taught waypoints need, by name."""
+        self.waypoints: dict[str, str] = {}  # values of the variables that taught waypoints need
         self.has_directions = False
 
-    def move(self, node: Element, following: Element | None) -> None:
-        """Translate a Move node; `following` is the node behind it."""
-        kind = node.get("motionType") or ""
+    def move(self, node: Element) -> None:
+        """Translate a Move node."""
+        kind, following = node.get("motionType") or "", self._following[node]
         if kind not in _FUNCTIONS or node.get("optimoveEnabled") == "true":
             raise UnknownPartError(f"Move ({kind or 'without a type'})")
         speed, acceleration = _number(node.get("speed")), _number(node.get("acceleration"))
@@ -81,7 +80,7 @@ class Moves:
             "" if active or tcp is None else self._tcp(tcp), not active and tcp is None, node.find("feature"),
             following is None or following.get("motionType") != "MoveP",
         )  # fmt: skip
-        self._text.label(self._number[node], kind)
+        self._text.label(node, kind)
         self._styles.append(style)
         self._children(node)
         self._styles.pop()
@@ -101,7 +100,7 @@ class Moves:
 
     # ------------------------------------------------------------------ waypoints
 
-    def waypoint(self, node: Element, following: Element | None) -> None:
+    def waypoint(self, node: Element) -> None:
         """Translate a Waypoint."""
         style, (place, near) = self._style, self._place(node)
         own = node.find("motionParameters")
@@ -118,7 +117,7 @@ class Moves:
                 duration = f", t={_number(value)}"
             else:
                 raise UnknownPartError(f"a waypoint's {name}")
-        self._text.label(self._number[node], self._name(node))
+        self._text.label(node, self._name(node))
         if style.tcp:
             self._text.line(style.tcp)
         if near and place != near:
@@ -126,7 +125,7 @@ class Moves:
             place = f"get_inverse_kin({place}, qnear={near})" if style.kind == "MoveJ" else place
         radius = f", r={blend!r}" if blend else ""
         if style.kind == "MoveP":
-            radius = f", r={0.0 if following is None and style.ends else style.blend!r}"
+            radius = f", r={self._blend(node)!r}"
         self._text.line(f"{_FUNCTIONS[style.kind]}({place}, a={acceleration}, v={speed}{duration}{radius})")
 
     def _name(self, node: Element) -> str:
@@ -159,25 +158,28 @@ class Moves:
             raise UnknownPartError(f"the waypoint {name}: {error}") from error
         raise UnknownPartError(f"a Waypoint ({node.get('type') or 'without a type'}) that is not taught")
 
-    def circle(self, node: Element, following: Element | None) -> None:
+    def circle(self, node: Element) -> None:
         """Translate a CircleMove: an arc through its first waypoint to its second."""
         style, points = self._style, node.findall("./children/Waypoint")
         if len(points) != 2:
             raise UnknownPartError("a CircleMove without two waypoints")
-        self._text.label(self._number[node], "CircleMove")
+        self._text.label(node, "CircleMove")
         places = [self._place(point)[0] for point in points]
         for point in points:
-            self._text.label(self._number[point], self._name(point))
-        radius = 0.0 if following is None and style.ends else style.blend
+            self._text.label(point, self._name(point))
         mode = ", mode=1" if node.get("OrientationMode") == "FIXED" else ""
-        ends = ", ".join(places)
+        ends, radius = ", ".join(places), self._blend(node)
         self._text.line(f"movec({ends}, a={style.acceleration}, v={style.speed}, r={radius!r}{mode})")
+
+    def _blend(self, node: Element) -> float:
+        """Return the blend radius at a node of a MoveP [m]: 0 at the end of the motion."""
+        return 0.0 if self._following[node] is None and self._style.ends else self._style.blend
 
     # ------------------------------------------------------------------ directions
 
     def direction(self, node: Element) -> None:
         """Translate a motion in a direction: a thread moves until one of the Until nodes ends it."""
-        style, text, number = self._style, self._text, self._number[node]
+        style, text, number = self._style, self._text, self._text.numbers[node]
         feature = node.find("feature")
         shown, frame = self.feature(style.feature if feature is None else feature)
         axis, direction = self._axis(node)
@@ -189,7 +191,7 @@ class Moves:
             (_number(end.findtext("Distance")) for end in ends if end.get("type") == "DISTANCE"), repr(_FAR)
         )
         self.has_directions = True
-        text.label(number, f"Direction: {shown} {axis}".rstrip())
+        text.label(node, f"Direction: {shown} {axis}".rstrip())
         text.line(f"global move_state_{number}=0")
         with text.block(f"thread move_{number}():"):
             text.line("enter_critical", f"move_state_{number} = 1")
@@ -244,7 +246,7 @@ class Moves:
             text.line(halt)
             if kind == "TOOL_CONTACT_DETECTION":
                 self._retract(_number(node.get("retraction")), stop)
-            text.label(self._number[node], f"Until ({kind.lower()})")
+            text.label(node, f"Until ({kind.lower()})")
             if node.get("allowActions") == "true":
                 self._children(node)
             text.line("break")

@@ -1,7 +1,8 @@
 """The nodes of a program saved by PolyScope, as URScript."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import pairwise
+from typing import NoReturn
 from xml.etree.ElementTree import Element
 
 from tvist_server.polyscope import contributed
@@ -40,113 +41,76 @@ class Nodes:
         numbers_of: dict[Element, int],
         skip: frozenset[str] = frozenset(),
     ) -> None:
-        self.text, self.missing = ScriptText(), list[str]()
-        self._references, self._number, self._skip = references, numbers_of, skip
+        self.text, self.missing = ScriptText(numbers_of), list[str]()
+        self._references, self._skip = references, skip
+        self._following: dict[Element | None, Element | None] = {}  # the node behind each node
         self.expressions = Expressions(references, installation)
         self._switches, self._grip = 0, ""  # number of Switch nodes; condition of the present Grip Check
-        self.moves = Moves(
-            self.text, self.expressions, references, installation, numbers_of, self.children
-        )  # fmt: skip
+        self.moves = moves = Moves(
+            self.text, self.expressions, references, installation, self._following, self.children
+        )
+        self._kinds: dict[str, Callable[[Element], object]] = {
+            "Placeholder": lambda _: None, "SubProgram": lambda _: None,  # defined before the program
+            "Folder": self._folder, "Comment": self._comment, "Script": self._script, "Wait": self._wait,
+            "Halt": self._halt, "Popup": self._popup, "Assignment": self._assignment, "If": self._if,
+            "Loop": self._loop, "Switch": self._switch, "Set": self._set, "Force": self._force,
+            "CallSubProgram": self._call, "Contributed": self._contributed, "Move": moves.move,
+            "Waypoint": moves.waypoint, "CircleMove": moves.circle, DIRECTION: moves.direction,
+        }  # fmt: skip
 
     def children(self, node: Element) -> None:
         """Translate the nodes inside a node."""
-        self.siblings(children_of(node))
-
-    def siblings(self, nodes: list[Element]) -> None:
-        """Translate nodes that follow each other."""
-        shown = [node for node in nodes if node.tag != "SuppressedNode"]
-        for node, following in pairwise([*shown, None]):
-            assert node is not None
+        shown = [one for one in children_of(node) if one.tag != "SuppressedNode"]
+        self._following.update(pairwise([*shown, None]))
+        for one in shown:
             try:
-                self._node(node, following)
+                self._kinds.get(one.tag, _refuse)(one)
             except UnknownPartError as error:
                 self.missing.append(str(error))
             except ValueError as error:
-                self.missing.append(f"{node.tag} with {error}")
-
-    def _label(self, node: Element, title: str) -> None:
-        self.text.label(self._number[node], title)
+                self.missing.append(f"{one.tag} with {error}")
 
     def _branch(self, node: Element, head: str, title: str, *, more: bool) -> None:
         """Translate a branch; `more` follow it. The label of an `if` stands before it, those of others inside."""
         first = head.startswith("if ")
         if first:
-            self._label(node, title)
+            self.text.label(node, title)
         with self.text.block(head, "" if more else "end"):
             if not first:
-                self._label(node, title)
+                self.text.label(node, title)
             self.children(node)
-
-    def _node(self, node: Element, following: Element | None) -> None:  # noqa: C901, PLR0912  one case a kind
-        text, kind = self.text, node.get("type")
-        match node.tag, kind:
-            case ("Placeholder", _):
-                pass
-            case ("Folder", _):
-                self._label(node, node.get("name") or "Folder")
-                self.children(node)
-            case ("Comment", _):
-                words = " ".join((node.get("comment") or "").split())
-                self._label(node, f"'{words}'")
-            case ("Script", _):
-                self._script(node)
-            case ("Wait", _):
-                self._wait(node)
-            case ("Halt", _):
-                self._label(node, "Halt")
-                text.line("halt")
-            case ("Popup", _) if kind in _POPUPS:
-                self._popup(node, kind)
-            case ("Assignment", _):
-                self._assignment(node)
-            case ("If", _):
-                self._if(node, following)
-            case ("Loop", _):
-                self._loop(node)
-            case ("Switch", _):
-                self._switch(node)
-            case ("Set", _):
-                self._set(node)
-            case ("Force", "Frame"):
-                self._force(node)
-            case ("CallSubProgram", _):
-                name = script_name(self._sub_program(node))
-                self._label(node, f"Call {name}")
-                text.line(f"{name}()")
-            case ("SubProgram", _):
-                pass  # defined before the program
-            case ("Move", _):
-                self.moves.move(node, following)
-            case ("Waypoint", _):
-                self.moves.waypoint(node, following)
-            case ("CircleMove", _):
-                self.moves.circle(node, following)
-            case (tag, _) if tag == DIRECTION:
-                self.moves.direction(node)
-            case ("Contributed", _):
-                self._contributed(node, following)
-            case (tag, _):
-                raise UnknownPartError(tag if kind is None else f"{tag} ({kind})")
 
     # ------------------------------------------------------------------ flow
 
+    def _folder(self, node: Element) -> None:
+        self.text.label(node, node.get("name") or "Folder")
+        self.children(node)
+
+    def _comment(self, node: Element) -> None:
+        words = " ".join((node.get("comment") or "").split())
+        self.text.label(node, f"'{words}'")
+
+    def _halt(self, node: Element) -> None:
+        self.text.label(node, "Halt")
+        self.text.line("halt")
+
     def _script(self, node: Element) -> None:
         if node.find("./expression/*") is not None:
-            self._label(node, self.expressions.label(node))
+            self.text.label(node, self.expressions.label(node))
             self.text.line(self.expressions.text(node))
             return
         content = node.findtext("cachedContents") or node.findtext("text") or node.text or ""
         if not content.strip():
             raise UnknownPartError("a Script without text")
         file = (node.findtext("file") or "").rpartition("/")[2]
-        self._label(node, f"Script: {file}")
+        self.text.label(node, f"Script: {file}")
         self.text.line(content.rstrip("\n"))
 
     def _wait(self, node: Element) -> None:
         match node.get("type"):
             case "Sleep":
                 seconds = repr(numbers(node.findtext("waitTime"), 1)[0])
-                self._label(node, f"Wait: {seconds}")
+                self.text.label(node, f"Wait: {seconds}")
                 self.text.line(f"sleep({seconds})")
                 return
             case "Condition":
@@ -155,13 +119,15 @@ class Nodes:
                 shown = condition = self.moves.input_is(node)
             case other:
                 raise UnknownPartError(f"Wait ({other or 'without a type'})")
-        self._label(node, f"Wait: {shown}")
+        self.text.label(node, f"Wait: {shown}")
         with self.text.block(f"while (not({condition})):"):
             self.text.line("sync()")
 
-    def _popup(self, node: Element, kind: str) -> None:
+    def _popup(self, node: Element) -> None:
+        if (kind := node.get("type") or "") not in _POPUPS:
+            _refuse(node)
         message = " ".join((node.get("message") or "").replace('"', "'").split())
-        self._label(node, f"Popup: {message}")
+        self.text.label(node, f"Popup: {message}")
         self.text.line(f'popup("{message}", "{kind}", {_POPUPS[kind]}, blocking=True)')
         if node.get("haltProgram") == "true":
             self.text.line("halt")
@@ -171,16 +137,17 @@ class Nodes:
         source = node.get("valueSource") or "Expression"
         if source != "Expression":
             raise UnknownPartError(f"Assignment ({source})")
-        self._label(node, f"{name}≔{self.expressions.label(node)}")
+        self.text.label(node, f"{name}≔{self.expressions.label(node)}")
         self.text.line(f"global {name}={self.expressions.text(node)}")
 
-    def _if(self, node: Element, following: Element | None) -> None:
+    def _if(self, node: Element) -> None:
         if node.get("checkContinuously") == "true":
             raise UnknownPartError("an If that checks its condition continuously")
         kind, condition = node.get("type") or "If", self.expressions.text(node)
         heads = {"If": f"if ({condition}):", "ElseIf": f"elif ({condition}):", "Else": "else:"}
         if kind not in heads:
             raise UnknownPartError(f"If ({kind})")
+        following = self._following[node]
         more = following is not None and following.tag == "If" and following.get("type") != "If"
         title = f"{kind} {self.expressions.label(node)}"
         self._branch(node, heads[kind], title if kind == "If" else title.rstrip(), more=more)
@@ -188,25 +155,25 @@ class Nodes:
     def _loop(self, node: Element) -> None:
         match node.get("type"):
             case "Forever":
-                self._label(node, "Loop")
+                self.text.label(node, "Loop")
                 with self.text.block("while (True):"):
                     self.children(node)
             case "Counting":
                 count = int(numbers(node.get("count"), 1)[0])
                 name = self.expressions.variable(node.find("loopVariable"))
-                self._label(node, f"Loop {count} times")
+                self.text.label(node, f"Loop {count} times")
                 self.text.line(f"{name} = 0")
                 with self.text.block(f"while ({name} < {count}):"):
                     self.children(node)
                     self.text.line(f"{name} = {name} + 1")
             case "While":
-                self._label(node, f"Loop {self.expressions.label(node)}")
+                self.text.label(node, f"Loop {self.expressions.label(node)}")
                 self._while(node)
             case other:
                 raise UnknownPartError(f"Loop ({other or 'without a type'})")
 
     def _while(self, node: Element) -> None:
-        condition, number = self.expressions.text(node), self._number[node]
+        condition, number = self.expressions.text(node), self.text.numbers[node]
         if node.get("checkContinuously") != "true":
             with self.text.block(f"while ({condition}):"):
                 self.children(node)
@@ -221,7 +188,7 @@ class Nodes:
             self.text.line(f"kill thread_handler_{number}")
 
     def _switch(self, node: Element) -> None:
-        self._label(node, f"Switch {self.expressions.label(node)}")
+        self.text.label(node, f"Switch {self.expressions.label(node)}")
         self._switches += 1
         name = f"switch_{self._switches}"
         self.text.line(f"{name} = {self.expressions.text(node)}")
@@ -235,28 +202,31 @@ class Nodes:
                 head, title = f"{'elif' if place else 'if'} ({number} == {name}):", f"Case {number}"
             self._branch(case, head, title, more=case is not cases[-1])
 
-    def _sub_program(self, node: Element) -> str:
+    def _call(self, node: Element) -> None:
         target = self._references.target(node.find("subprogram"))
         name = "" if target is None else target.get("name") or ""
         if not name:
             raise UnknownPartError("a call of a sub-program that is not in the file")
-        return name
+        self.text.label(node, f"Call {script_name(name)}")
+        self.text.line(f"{script_name(name)}()")
 
     # ------------------------------------------------------------------ robot
 
     def _set(self, node: Element) -> None:
         match node.get("type"):
             case "NoAction":
-                self._label(node, "Set")
+                self.text.label(node, "Set")
             case "DigitalOutput":
                 function, number, shown = self.expressions.output(node.find("pin"))
                 on = node.findtext("digitalValue") in {"1", "true"}
-                self._label(node, f"Set {shown}={'On' if on else 'Off'}")
+                self.text.label(node, f"Set {shown}={'On' if on else 'Off'}")
                 self.text.line(f"{function}({number}, {on})")
             case other:
                 raise UnknownPartError(f"Set ({other or 'without a type'})")
 
     def _force(self, node: Element) -> None:
+        if node.get("type") != "Frame":
+            _refuse(node)
         name, frame = self.moves.feature(node.find("feature"))
         parts = {
             tag: numbers(_value(node, tag), 6)
@@ -267,26 +237,26 @@ class Nodes:
             force if axis else motion
             for axis, force, motion in zip(chosen, parts["limitsForce"], parts["limitsMotion"], strict=True)
         ]
-        self._label(node, "Force")
+        self.text.label(node, "Force")
         self.text.line("sleep(0.02)", "zero_ftsensor()")
         frame = "tool_pose()" if name == "Tool" else frame
         self.text.line(f"force_mode({frame}, {chosen}, {list(parts['wrench'])}, 2, {limits})")
         self.children(node)
         self.text.line("end_force_mode()", "stopl(5.0)")
 
-    def _contributed(self, node: Element, following: Element | None) -> None:
-        kind = contributed.kind_of(node)
+    def _contributed(self, node: Element) -> None:
+        kind, following = contributed.kind_of(node), self._following[node]
         title = node.get("strategyProgramNodeType") or "URCap"
         if kind in self._skip or node.get("strategyURCapName") in self._skip:
             return
         if (lines := contributed.lines_of(node)) is not None:
-            self._label(node, title)
+            self.text.label(node, title)
             self.text.line(*lines)
         elif (branch := contributed.branch_of(node)) is None:
             raise UnknownPartError(kind)
         elif not branch:
             self._grip = contributed.detection(node)
-            self._label(node, title)
+            self.text.label(node, title)
             self.children(node)
         elif not self._grip:
             raise UnknownPartError(f"{kind} outside a Grip Check")
@@ -299,3 +269,8 @@ class Nodes:
 def _value(node: Element, tag: str) -> str:
     found = node.find(tag)
     return "" if found is None else found.get("value") or ""
+
+
+def _refuse(node: Element) -> NoReturn:
+    kind = node.get("type")
+    raise UnknownPartError(node.tag if kind is None else f"{node.tag} ({kind})")

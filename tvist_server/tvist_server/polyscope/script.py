@@ -33,7 +33,7 @@ def script_of(
     """
     root, main = tree.find("./children"), tree.find("./children/MainProgram")
     if root is None or main is None or main.find("./children/*") is None:
-        raise UserFileError("it is PolyScope's and has no program: save it as a script")
+        raise UserFileError("it has no program that can be read: save it in PolyScope as a script")
     before, threads = root.findall("./SpecialSequence"), root.findall("./Thread")
     references = References(tree)
     functions = _functions(root, references)
@@ -48,22 +48,22 @@ def script_of(
     text = nodes.text
     for title, function in functions.items():
         with text.block(f"def {title}():"):
-            text.label(numbers[function], title)
+            text.label(function, title)
             nodes.children(function)
     if main.get("InitVariablesNode") == "true":
         for variable in root.findall("./InitVariablesNode/variables/variable"):
             _initial(nodes, variable)
     for sequence in before:
-        text.label(numbers[sequence], "BeforeStart")
+        text.label(sequence, "BeforeStart")
         nodes.children(sequence)
     for thread in threads:
         title = script_name(thread.get("name") or "Thread")
-        text.label(numbers[thread], title)
+        text.label(thread, title)
         with text.block(f"thread {title}():"):
             _repeated(nodes, thread, again=thread.get("runOnlyOnce") != "true")
         text.line(f"threadId_{title} = run {title}()")
     again = main.get("runOnlyOnce") == "false" and _acts(main)
-    _repeated(nodes, main, again=again, label=(numbers[main], "Robot Program"))
+    _repeated(nodes, main, again=again, label="Robot Program")
     if nodes.missing:
         found = ", ".join(dict.fromkeys(map(short, nodes.missing)))
         raise UserFileError(f"PolyScope saved it with {found}, which cannot be simulated")
@@ -71,14 +71,14 @@ def script_of(
     start.line(*given.start(), *(f"global {at}={value}" for at, value in nodes.moves.waypoints.items()))
     if nodes.moves.has_directions:
         start.line(TOWARDS)
-    return program(name, f"{start}{text}")
+    return program_text(name, f"{start}{text}")
 
 
-def _repeated(nodes: Nodes, part: Element, *, again: bool, label: tuple[int, str] | None = None) -> None:
+def _repeated(nodes: Nodes, part: Element, *, again: bool, label: str = "") -> None:
     """Translate a main program, which has a label, or a thread; `again` repeats it."""
     with nodes.text.block("while (True):") if again else nullcontext():
-        if label is not None:
-            nodes.text.label(*label)
+        if label:
+            nodes.text.label(part, label)
         nodes.children(part)
 
 
@@ -122,7 +122,7 @@ def _only_defines(text: str) -> bool:
         return False
 
 
-def program(name: str, body: str) -> str:
+def program_text(name: str, body: str) -> str:
     """Return a program with a body, named after a file."""
     title = "".join(letter if letter.isalnum() and letter.isascii() else "_" for letter in name)
     lines = "\n".join(f"  {line}" if line else "" for line in body.rstrip("\n").split("\n"))

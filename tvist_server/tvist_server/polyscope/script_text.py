@@ -1,13 +1,16 @@
 """The text of a script while it is written: indented blocks, and labels with the numbers of PolyScope's nodes."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from types import MappingProxyType
+from xml.etree.ElementTree import Element
 
 
 class ScriptText:
     """Lines of URScript."""
 
-    def __init__(self) -> None:
+    def __init__(self, numbers: Mapping[Element, int] = MappingProxyType({})) -> None:
+        self.numbers = numbers  # PolyScope's numbers of the nodes
         self._lines: list[str] = []
         self._depth = 0
 
@@ -16,10 +19,10 @@ class ScriptText:
         indent = "  " * self._depth
         self._lines += [indent + part for line in lines for part in line.split("\n")]
 
-    def label(self, number: int, title: str) -> None:
+    def label(self, node: Element, title: str) -> None:
         """Add the label of a node."""
         plain = "".join(c for c in title.replace('"', "'") if c.isprintable())
-        self.line(f'$ {number} "{plain}"')
+        self.line(f'$ {self.numbers[node]} "{plain}"')
 
     @contextmanager
     def block(self, head: str, end: str = "end") -> Iterator[None]:

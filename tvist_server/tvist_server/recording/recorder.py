@@ -30,7 +30,7 @@ QUEUE_SIZE = 8192
 """Number of messages that may wait: 30 MB, five seconds at 1500 messages/s, as a file system's commit may take."""
 PAUSE = 0.02
 """Time between two checks of the queue [s]; waking the writer would cost a system call and the interpreter's lock."""
-LOOK = 1.0  # time between two checks whether the file was moved or deleted [s]
+CHECK_EVERY = 1.0  # time between two checks whether the file was moved or deleted [s]
 
 
 class Recorder(Sink):
@@ -130,17 +130,17 @@ class Recorder(Sink):
 
     def _run(self) -> None:
         try:
-            looked = time.monotonic()
+            checked = time.monotonic()
             while not self._closing:
                 self._wake.wait(PAUSE)
                 self._wake.clear()
                 self._drain()
-                if time.monotonic() - looked >= LOOK:
-                    self._look()
-                    looked = time.monotonic()
+                if time.monotonic() - checked >= CHECK_EVERY:
+                    self._check_file()
+                    checked = time.monotonic()
             self._drain()
             self._file.finish()
-            self._look()
+            self._check_file()
             self._file.close()
         except DeletedError:
             self._stop(
@@ -150,7 +150,7 @@ class Recorder(Sink):
         except Exception as error:  # noqa: BLE001  nothing above this thread would report it
             self._stop(f"the recording {self.path} has stopped and is incomplete: {_reason(error)}")
 
-    def _look(self) -> None:
+    def _check_file(self) -> None:
         """Report once that the file was moved; DeletedError if it was deleted, because its data is lost anyway."""
         there, expected = self._file.where(), self._file.path
         self.place = self._file.whole if there == expected else there

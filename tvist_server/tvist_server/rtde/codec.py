@@ -7,6 +7,8 @@ from struct import Struct
 HEADER = Struct(">HB")
 LARGEST = 0xFFFF  # largest size of a package including the header [bytes]
 TEXT = 255  # longest text in a message [bytes]
+WARNING = b"\x02"  # severity of a text message
+SOURCE = b"\x04RTDE"  # source of a text message, behind its length
 
 
 class PackageKind(IntEnum):
@@ -20,15 +22,6 @@ class PackageKind(IntEnum):
     SETUP_INPUTS = ord("I")
     START = ord("S")
     PAUSE = ord("P")
-
-
-class TextLevel(IntEnum):
-    """Severity of a text message."""
-
-    EXCEPTION = 0
-    ERROR = 1
-    WARNING = 2
-    INFO = 3
 
 
 class PackageReader:
@@ -69,13 +62,9 @@ def words(kind: PackageKind, head: bytes, names: Iterable[str]) -> bytes:
     return package(kind, head + text)
 
 
-def text_message(version: int, level: TextLevel, text: str, source: str) -> bytes:
-    """Return a text message to the client, without lengths and source in version 1; texts are cut after 255 bytes."""
+def warning(version: int, text: str) -> bytes:
+    """Return a warning to the client, without lengths and source in version 1; texts are cut after 255 bytes."""
     message = text.encode()[:TEXT]
     if version == 1:
-        return package(PackageKind.TEXT_MESSAGE, bytes([level]) + message)
-    named = source.encode()[:TEXT]
-    return package(
-        PackageKind.TEXT_MESSAGE,
-        bytes([len(message)]) + message + bytes([len(named)]) + named + bytes([level]),
-    )
+        return package(PackageKind.TEXT_MESSAGE, WARNING + message)
+    return package(PackageKind.TEXT_MESSAGE, bytes([len(message)]) + message + SOURCE + WARNING)

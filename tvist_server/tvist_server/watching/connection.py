@@ -28,7 +28,7 @@ class UnreachableError(LostError):
 
 
 class RtdeConnection:
-    """One connection to the robot at `place`, whose `address` comes from `resolved`; `client` reads and writes."""
+    """One connection to the robot at `place`, whose `address` comes from `resolve`; `client` reads and writes."""
 
     def __init__(self, place: RobotAddress, address: Address, client: RtdeClient) -> None:
         self._place, self.client = place, client
@@ -114,7 +114,7 @@ class RtdeConnection:
             raise UnreachableError(f"no robot answers at {self._place} within {ANSWERS:g} s")
 
 
-def resolved(place: RobotAddress) -> Address:
+def resolve(place: RobotAddress) -> Address:
     """Resolve an address, which may take seconds; raise LostError if it has none."""
     try:
         found = socket.getaddrinfo(place.host, place.port, type=socket.SOCK_STREAM)[0]

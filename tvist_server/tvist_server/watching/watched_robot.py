@@ -18,10 +18,10 @@ from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 from tvist_server.rtde.client import Row, RtdeClient, RtdeError
 from tvist_server.rtde.wire import Field, WireType
 from tvist_server.watching.address import RobotAddress
-from tvist_server.watching.connection import ANSWERS, LostError, RtdeConnection, UnreachableError, resolved
+from tvist_server.watching.connection import ANSWERS, LostError, RtdeConnection, UnreachableError, resolve
 from tvist_server.watching.variables import JOINTS, NEEDED, OPTIONAL, RowCount, has_real_payload, sight_of
 
-LOOKED_AT = 25  # number of rows that determine the row rate
+FIRST_ROWS = 25  # number of rows that determine the row rate
 INTERVALS = {1: "500", 4: "125"}  # control periods between two rows, and the row rate of such a robot [Hz]
 TEXTS = 10  # largest number of the robot's texts passed on in a second, and queued for its next row
 RETRY = 1.0  # time between two attempts to connect [s]
@@ -53,15 +53,15 @@ class WatchedRobot(RealArm):
         self._constants = [rating.torque_constant for rating in joint_ratings(description)]
         self._sights: deque[tuple[Sight, Row]] = deque()
         self._connection: RtdeConnection | None = None
-        self.looked_at: list[Row] = []  # rows read before the first tick
+        self.first_rows: list[Row] = []  # rows read before the first tick
         self._checked = False  # whether the present connection has sent a row of the right robot
         self._lost = 0.0, ""  # time [s] and reason of the loss of the connection; empty while connected
         self._retry_at = self._told_at = self._texts_at = 0.0
         self._untold = self._room = self._left_out = 0
         self._notes: list[str] = []
         try:
-            self._address = resolved(place)
-            self._look()
+            self._address = resolve(place)
+            self._inspect()
         except LostError as error:
             raise PlantError(f"{error}. {_NEXT}") from error
 
@@ -82,7 +82,7 @@ class WatchedRobot(RealArm):
     def sight(self) -> Sight:
         """Return the next row."""
         if not self._sights:
-            raise PlantError(f"the robot at {self._place} has said nothing new")
+            raise PlantError(f"the robot at {self._place} has sent no new row")
         self._last, self.newest = self._sights.popleft()
         return self._last
 
@@ -117,13 +117,13 @@ class WatchedRobot(RealArm):
             self._connection.close()
             self._connection = None
 
-    def _look(self) -> None:
+    def _inspect(self) -> None:
         """Read rows before the server ticks to determine the robot's model and row rate."""
         self._connect()
-        rows = self.looked_at
+        rows = self.first_rows
         try:
             ends = time.monotonic() + ANSWERS
-            while len(rows) < LOOKED_AT:
+            while len(rows) < FIRST_ROWS:
                 rows += self._rows(1.0)
                 if time.monotonic() > ends:
                     raise LostError(f"{self._place} sends only {len(rows)} rows in {ANSWERS:g} s")

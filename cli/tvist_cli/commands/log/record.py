@@ -43,7 +43,7 @@ def record(
     async def run() -> tuple[Path | None, int, int]:
         ticks: list[int] = []
         ended, loop = asyncio.Event(), asyncio.get_running_loop()
-        ending.hear(lambda: loop.call_soon_threadsafe(ended.set))
+        ending.on_request(lambda: loop.call_soon_threadsafe(ended.set))
         async with await at.robot() as robot:
             info = await robot.info()
             with Recorder(file, info, {}, keep=kept, on_error=say, on_moved=say) as recorder:

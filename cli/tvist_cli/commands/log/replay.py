@@ -135,7 +135,7 @@ def _publish(
         )
         playing = asyncio.ensure_future(playback.run())
         clock = asyncio.get_running_loop()
-        ending.hear(lambda: clock.call_soon_threadsafe(playing.cancel))
+        ending.on_request(lambda: clock.call_soon_threadsafe(playing.cancel))
         with suppress(asyncio.CancelledError):
             await playing
         return playback

@@ -3,6 +3,7 @@
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
 from tvist_controller.instruments.snapshot import Snapshot
@@ -15,9 +16,13 @@ Send = Callable[[bytes], None]  # sends an answer, which is never dropped
 Item = TypeVar("Item")
 
 
+@dataclass(eq=False)
 class PortSession(ABC):
     """One connection. Methods do not block and, whatever bytes arrive, do not raise: errors are answered."""
 
+    _robot: UrRobot
+    _control: ConnectionControl
+    _send: Send
     over = False  # whether the connection is closed, or the client has asked to close it
     client_begins = False
     """Whether the client gets nothing that it has not requested, so that it may be disconnected to make room."""
@@ -28,9 +33,6 @@ class PortSession(ABC):
     def waiting(self) -> int:
         """Number of received requests without an answer; many of them pause reading."""
         return 0
-
-    def __init__(self, robot: UrRobot, control: ConnectionControl, send: Send) -> None:
-        self._robot, self._control, self._send = robot, control, send
 
     def opened(self) -> None:  # noqa: B027  not every session has to
         """Send a greeting, if any, to the new client."""
@@ -52,13 +54,12 @@ class PortSession(ABC):
         self._control.leave()
 
 
+@dataclass(eq=False)
 class InTurnSession(PortSession, Generic[Item]):
     """Handles a client's requests one at a time; it finishes them, with control, even if the client disconnects."""
 
-    def __init__(self, robot: UrRobot, control: ConnectionControl, send: Send) -> None:
-        super().__init__(robot, control, send)
-        self._items = deque[Item]()
-        self._busy = False
+    _items: deque[Item] = field(default_factory=deque, init=False)
+    _busy: bool = field(default=False, init=False)
 
     @property
     def waiting(self) -> int:
@@ -81,7 +82,7 @@ class InTurnSession(PortSession, Generic[Item]):
         try:
             while self._items:
                 await self._do(self._items.popleft())
-        except Exception as error:  # noqa: BLE001  `hear` logs it and ends the connection
+        except Exception as error:  # noqa: BLE001  `deliver` logs it and ends the connection
             raised = error
         finally:
             self._busy = False
@@ -90,7 +91,7 @@ class InTurnSession(PortSession, Generic[Item]):
             if raised is not None:
                 raise raised
 
-        self._control.hear(done)
+        self._control.deliver(done)
         if self.over:
             self._control.leave()
 

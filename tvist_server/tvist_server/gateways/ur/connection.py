@@ -3,7 +3,6 @@
 import asyncio
 import contextlib
 import errno
-import ipaddress
 import logging
 import os
 import socket
@@ -13,6 +12,7 @@ from typing import Final, cast
 
 from tvist_controller.instruments.snapshot import Snapshot
 from tvist_protocol.stream import Event
+from tvist_server.allowed_hosts import ip_of
 from tvist_server.gateways.base import GatewayError
 from tvist_server.gateways.ur.base import PortSession, Send
 from tvist_server.gateways.ur.lease import ConnectionControl, HostLease
@@ -83,13 +83,13 @@ class ClientConnection(asyncio.BufferedProtocol):
         self._transport = stream = cast("asyncio.Transport", transport)
         (host, port), (own, own_port) = (stream.get_extra_info(end)[:2] for end in ("peername", "sockname"))
         self.peer = f"the client {host}:{port} of port {own_port}"
-        if not self._limit.make_room(self.peer, local=host == own or _is_loopback(host)):
+        if not self._limit.make_room(self.peer, local=host == own or ip_of(host).is_loopback):
             stream.abort()
             return
         stream.get_extra_info("socket").setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         if not self._lossless:
             stream.set_write_buffer_limits(ANSWERS)
-        self._control = ConnectionControl(self._lease(host), self._hear, self.peer)
+        self._control = ConnectionControl(self._lease(host), self._deliver, self.peer)
         self.session = self._make(self._control, self.send)
         self._limit.taken.add(self)
         self._admitted = True
@@ -114,7 +114,7 @@ class ClientConnection(asyncio.BufferedProtocol):
         self._behind = False
         self._listen()
 
-    def _hear(self, answer: Callable[[], None]) -> None:
+    def _deliver(self, answer: Callable[[], None]) -> None:
         with self._guard():
             answer()
         self._listen()
@@ -162,12 +162,9 @@ class ClientConnection(asyncio.BufferedProtocol):
         """Return the sample of a tick for `put`; empty if there is none."""
         if self._transport.is_closing():
             return b""
-        try:
+        data = b""
+        with self._guard():
             data = self.session.sample(snapshot)
-        except Exception:
-            log.exception("a UR interface failed and disconnected its client")
-            self._transport.abort()
-            return b""
         if self.session.over:
             self._transport.close()
         return data
@@ -218,23 +215,19 @@ class ConnectionLimit:
     longest: a dashboard client, or an RTDE client outside the time from its start to its pause.
     """
 
-    def __init__(
-        self, now: Callable[[], float], note: Callable[[str], None], most: int = MAX_CONNECTIONS
-    ) -> None:
+    def __init__(self, now: Callable[[], float], note: Callable[[str], None]) -> None:
         self.taken: set[ClientConnection] = set()  # clients that have a place; each adds and removes itself
-        self._now = now
-        self._note = note
-        self._most = most
+        self._now, self._note = now, note
 
     def make_room(self, peer: str, *, local: bool) -> bool:
         """Return whether a new client may connect; disconnect another one for it if necessary."""
-        if len(self.taken) >= SCARCE * self._most:
+        if len(self.taken) >= SCARCE * MAX_CONNECTIONS:
             self._send_one_away(peer)
         kept = 0 if local else LOCAL_PLACES
-        if len(self.taken) < self._most - kept:
+        if len(self.taken) < MAX_CONNECTIONS - kept:
             return True
         self._note(
-            f"{peer} was refused: {len(self.taken)} of {self._most} connections are in use"
+            f"{peer} was refused: {len(self.taken)} of {MAX_CONNECTIONS} connections are in use"
             + (f", and {LOCAL_PLACES} are kept for this machine" if kept else "")
         )
         return False
@@ -248,7 +241,7 @@ class ConnectionLimit:
         self.taken.discard(silent)
         self._note(
             f"{silent.peer}, silent for {self._now() - silent.heard:.0f} s, was closed to make room for {newcomer}: "
-            f"{taken} of {self._most} connections were in use"
+            f"{taken} of {MAX_CONNECTIONS} connections were in use"
         )
 
 
@@ -263,13 +256,6 @@ def _left_in(transport: asyncio.Transport) -> bytes:
         while len(left) < LAST_WORDS and (data := stream.recv(LAST_WORDS - len(left))):
             left += data
     return bytes(left)
-
-
-def _is_loopback(host: str) -> bool:
-    address = ipaddress.ip_address(host)
-    if isinstance(address, ipaddress.IPv6Address) and address.ipv4_mapped is not None:
-        address = address.ipv4_mapped
-    return address.is_loopback
 
 
 def listen(address: str, port: int, interface: InterfaceName) -> socket.socket:

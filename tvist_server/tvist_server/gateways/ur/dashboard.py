@@ -1,22 +1,24 @@
 """UR's dashboard, port 29999: one command a line, and answers that clients compare word by word."""
 
 from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, field
+from functools import partial
 from typing import Final, NamedTuple
 
 from tvist_controller.instruments.snapshot import Snapshot
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
-from tvist_server.gateways.ur import messages, power, version
-from tvist_server.gateways.ur.base import InTurnSession, LineSplitter, Send
+from tvist_server.gateways.ur import messages, power
+from tvist_server.gateways.ur.base import InTurnSession, LineSplitter
 from tvist_server.gateways.ur.deferred import Deferred
 from tvist_server.gateways.ur.lease import ConnectionControl
 from tvist_server.gateways.ur.power import Change
 from tvist_server.gateways.ur.programs import Programs
 from tvist_server.gateways.ur.robot import NO_MODE, UrRobot
+from tvist_server.gateways.ur.version import DATE, VERSION
 from tvist_server.ur_model import series
 
 GREETING: Final = "Connected: Universal Robots Dashboard Server"
-LONGEST: Final = 4096
-"""Longest line [bytes]; the rest of a longer one is ignored."""
+LONGEST: Final = 4096  # longest line [bytes]; the rest of a longer one is ignored
 PATIENCE: Final = 2500  # ticks within which a stopped arm must come to rest
 ECHO: Final = 200  # characters of an unknown line that the answer repeats
 UNNAMED: Final = "<unnamed>"  # reported name of the program while none is loaded
@@ -108,15 +110,14 @@ async def _stop(request: Request) -> str | None:
 
 
 def _popup(request: Request) -> str:
-    stamp = messages.stamp(request.robot.latest)
-    request.robot.tell(messages.popup(stamp, "Message", request.argument))
+    request.robot.tell(messages.popup(request.robot.latest, "Message", request.argument))
     return "showing popup"
 
 
 def _add_to_log(request: Request) -> str:
     if not request.argument:
         return "No log message to add"
-    request.robot.tell(messages.text(messages.stamp(request.robot.latest), request.argument))
+    request.robot.tell(messages.text(request.robot.latest, request.argument))
     return "Added log message"
 
 
@@ -158,7 +159,7 @@ def _bool(value: bool) -> str:
 
 
 QUIT: Final = "quit"
-NUMBER: Final = f"{version.MAJOR}.{version.MINOR}.{version.BUGFIX}.{version.BUILD}"
+NUMBER: Final = ".".join(map(str, VERSION))
 COMMANDS: Final = (
     Command("power on", _changing(power.power_on, "Powering on")),
     Command("power off", _changing(power.power_off, "Powering off")),
@@ -186,7 +187,7 @@ COMMANDS: Final = (
     Command("get operational mode", lambda request: request.robot.operational_mode),
     Command("clear operational mode", _clear_operational_mode),
     Command("is in remote control", lambda request: _bool(not request.control.held_by_other)),
-    Command("PolyscopeVersion", _say(f"URSoftware {NUMBER} ({version.DATE})")),
+    Command("PolyscopeVersion", _say(f"URSoftware {NUMBER} ({DATE})")),
     Command("version", _say(NUMBER)),
     Command("get robot model", _model),
     Command("get serial number", lambda request: request.robot.serial),
@@ -214,16 +215,14 @@ def find(line: str) -> tuple[Command, str] | None:
     return None
 
 
+@dataclass(eq=False)
 class DashboardSession(InTurnSession[str]):
     """One client of the dashboard."""
 
     client_begins = True
-
-    def __init__(self, robot: UrRobot, control: ConnectionControl, send: Send) -> None:
-        super().__init__(robot, control, send)
-        self._lines = LineSplitter(LONGEST)
-        self._rests: Deferred[bool] | None = None  # waits for the arm to rest
-        self._last = 0  # tick at which this wait ends
+    _lines: LineSplitter = field(default_factory=partial(LineSplitter, LONGEST), init=False)
+    _rests: Deferred[bool] | None = field(default=None, init=False)  # waits for the arm to rest
+    _last: int = field(default=0, init=False)  # tick at which this wait ends
 
     def opened(self) -> None:
         self._say(GREETING)
@@ -254,14 +253,14 @@ class DashboardSession(InTurnSession[str]):
             still = snapshot.runtime_state == RuntimeState.STOPPED
             if still or snapshot.state.tick >= self._last:
                 self._rests = None
-                rests.come(still)
+                rests.set(still)
         return b""
 
     def closed(self) -> None:
         self._end()
         super().closed()
         if self._rests is not None:
-            self._rests.come(False)
+            self._rests.set(False)
 
     def _end(self) -> None:
         self.over = True

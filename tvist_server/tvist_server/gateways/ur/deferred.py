@@ -17,7 +17,7 @@ class Deferred(Generic[T]):
         self._values: list[T] = []
         self._waiting: list[Coroutine[Deferred[Any], None, object]] = []
 
-    def come(self, value: T) -> None:
+    def set(self, value: T) -> None:
         if not self._values:
             self._values.append(value)
             for coroutine in self._waiting:

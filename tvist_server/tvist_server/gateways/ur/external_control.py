@@ -8,11 +8,11 @@ from typing import Final
 from tvist_plant.user_file import UserFileError
 from tvist_protocol.programs import MAX_SCRIPT
 from tvist_server.polyscope.contributed import EXTERNAL_CONTROL
-from tvist_server.polyscope.script import program, with_external_control
+from tvist_server.polyscope.script import program_text, with_external_control
 from tvist_server.program_folder import ProgramFolder
 
 FILE: Final = "external_control.urp"  # built-in program that consists of the node alone
-ALONE: Final = program("external_control", EXTERNAL_CONTROL)
+ALONE: Final = program_text("external_control", EXTERNAL_CONTROL)
 
 Fetch = Callable[[str], Awaitable[str | None]]
 """Requests a machine's part of the program; returns None if it does not answer."""
@@ -23,7 +23,7 @@ Aside = Callable[[Callable[[], str | None]], Awaitable[str | None]]
 class ExternalControl:
     """Completes such programs; `folder` has those that clients load by name."""
 
-    def __init__(self, folder: ProgramFolder | None, fetch: Fetch, aside: Aside) -> None:
+    def __init__(self, folder: ProgramFolder, fetch: Fetch, aside: Aside) -> None:
         self._folder, self._fetch, self._aside = folder, fetch, aside
 
     async def find(self, name: str) -> str | None:
@@ -32,9 +32,8 @@ class ExternalControl:
 
     def _text(self, name: str) -> str | None:
         text = None
-        if self._folder is not None:
-            with suppress(UserFileError):  # loading it reports the error
-                text = self._folder.read(name)
+        with suppress(UserFileError):  # loading it reports the error
+            text = self._folder.read(name)
         if text is None and name == FILE:
             return ALONE
         return text if text is not None and EXTERNAL_CONTROL in text else None

@@ -55,7 +55,7 @@ class UrInterfaces(Gateway):
 
     def __init__(
         self,
-        desk: CommandIntake,
+        intake: CommandIntake,
         description: RobotDescription,
         name: str,
         address: str,
@@ -67,19 +67,15 @@ class UrInterfaces(Gateway):
         reserved: Sequence[str] = (),  # RTDE inputs that no client may own, as if a fieldbus owned them
     ) -> None:
         self.address = address
-        self._desk, self._gripper = desk, gripper
-        self._throttles = [
-            Throttle(MOST_LINES, f"lines about {what}") for what in ("scripts", "refusals", "clients")
-        ]
-        external = ExternalControl(programs, self._fetch, self._aside)
-        self.robot = UrRobot(
-            description, name, self._tell, external, partial(self._log, 0), partial(self._log, 1)
-        )
+        self._intake, self._gripper = intake, gripper
+        subjects = ("scripts", "refusals", "clients")
+        self._throttles = {what: Throttle(MOST_LINES, f"lines about {what}") for what in subjects}
+        external = ExternalControl(programs or ProgramFolder(), self._fetch, self._read_aside)
+        scripts, refusals = partial(self._log, "scripts"), partial(self._log, "refusals")
+        self.robot = UrRobot(description, name, self._tell, external, scripts, refusals)
         self.robot.inputs.take(reserved, self)
-        self._instruments, self._boards = (
-            Instruments(description),
-            defaultdict[int, PackageEncoder](PackageEncoder),
-        )
+        self._instruments = Instruments(description)
+        self._encoders = defaultdict[int, PackageEncoder](PackageEncoder)
         self._io: Io | None = None
         self._early = deque[Report](maxlen=FIRST)
         """States from before `open`: temperatures and energies are integrated from the first tick."""
@@ -123,13 +119,13 @@ class UrInterfaces(Gateway):
         # One event loop serves all clients: another process would be a millisecond late and decode everything
         # twice, and a thread per client would compete with the tick.
         self._loop = asyncio.get_running_loop()
-        limit = ConnectionLimit(self._loop.time, partial(self._log, 2))
+        limit = ConnectionLimit(self._loop.time, partial(self._log, "clients"))
         self._connections = limit.taken
         if self._io is not None:
             self.robot.programs.io(self._io)
         while self._early:
-            self._see(self._early.popleft())
-        self._look()
+            self._handle_tick(self._early.popleft())
+        self._handle_queue()
         for interface, bound in self._sockets.items():
             session = partial(self._session, interface)
             connection = partial(ClientConnection, session, self._lease, limit, lossless=self._lockstep)
@@ -170,7 +166,7 @@ class UrInterfaces(Gateway):
         """Wake the interfaces' thread, unless it is about to run."""
         if not self._woken:
             self._woken = True
-            self._soon(self._look)
+            self._soon(self._handle_queue)
 
     async def shut(self) -> None:
         for task in self._tasks:
@@ -182,7 +178,7 @@ class UrInterfaces(Gateway):
         await asyncio.sleep(0)  # lets the connections end
         self._loop = None
         self._room.set()  # releases a thread that waits to pass on a state
-        self._write(line for throttle in self._throttles for line in throttle.rest())
+        self._write(line for throttle in self._throttles.values() for line in throttle.rest())
 
     def close(self) -> None:
         self._loop = None
@@ -190,7 +186,7 @@ class UrInterfaces(Gateway):
 
     # The following methods run in the interfaces' thread.
 
-    def _look(self) -> None:
+    def _handle_queue(self) -> None:
         """Handle the queued messages; later ones wake this thread again, so that clients get their turn."""
         self._woken = False
         for _ in range(len(self._news)):
@@ -198,7 +194,7 @@ class UrInterfaces(Gateway):
             if self._lockstep:
                 self._room.set()
             if isinstance(message, Report):
-                self._see(message)
+                self._handle_tick(message)
             elif isinstance(message, Io):
                 self._io = message
                 self.robot.programs.io(message)
@@ -207,13 +203,13 @@ class UrInterfaces(Gateway):
                 for connection in tuple(self._connections):
                     connection.event(message)
         if self._unread is not None:
-            self._read(self._unread)
+            self._take_snapshot(self._unread)
 
-    def _see(self, report: Report) -> None:
+    def _handle_tick(self, report: Report) -> None:
         if self._io is None:
             return
         if self._connections:
-            snapshot = self._read(report)
+            snapshot = self._take_snapshot(report)
             # All samples are made before the first is sent, so that the readers' process wakes up only once.
             for connection, data in [(one, one.sample(snapshot)) for one in tuple(self._connections)]:
                 if data:
@@ -222,7 +218,7 @@ class UrInterfaces(Gateway):
         self._unread, measured = report, report.sample.measured
         self._instruments.follow(report.tick, report.modes[0], measured.moment.tolist(), measured.qd.tolist())
 
-    def _read(self, report: Report) -> Snapshot:
+    def _take_snapshot(self, report: Report) -> Snapshot:
         assert self._io is not None
         self._unread = None
         self.robot.latest = self._instruments.snapshot(report.state, self._io)
@@ -239,14 +235,14 @@ class UrInterfaces(Gateway):
         self._adopted.adopt(token, self)
 
     def _session(self, interface: InterfaceName, control: ConnectionControl, send: Send) -> PortSession:
-        self._look()  # the client must see the robot's present state
+        self._handle_queue()  # the client must see the robot's present state
         robot, read_only = self.robot, interface.endswith("read_only")
         match interface:
             case "gripper":
                 assert self._gripper is not None
                 return GripperSession(robot, control, send, self._gripper, self._soon)
             case "rtde":
-                return RtdeSession(robot, control, send, self._boards)
+                return RtdeSession(robot, control, send, self._encoders)
             case "dashboard":
                 return DashboardSession(robot, control, send)
             case "interpreter":
@@ -259,7 +255,7 @@ class UrInterfaces(Gateway):
     def _lease(self, host: str) -> HostLease:
         lease = self._leases.get(host)
         if lease is None:
-            lease = self._leases[host] = HostLease(self._desk, host, self._soon)
+            lease = self._leases[host] = HostLease(self._intake, host, self._soon)
         return lease
 
     def _soon(self, action: Callable[[], None]) -> None:
@@ -268,7 +264,7 @@ class UrInterfaces(Gateway):
             with contextlib.suppress(RuntimeError):  # the loop is closed at shutdown
                 loop.call_soon_threadsafe(action)
 
-    def _aside(self, read: Callable[[], str | None]) -> Deferred[str | None]:
+    def _read_aside(self, read: Callable[[], str | None]) -> Deferred[str | None]:
         """Read a file in a daemon thread, which shutdown does not wait for."""
         later = Deferred[str | None]()
 
@@ -278,7 +274,7 @@ class UrInterfaces(Gateway):
                 text = read()
             except Exception:
                 log.exception("a program could not be read")
-            self._soon(lambda: later.come(text))
+            self._soon(lambda: later.set(text))
 
         threading.Thread(target=reading, name="tvist-ur-file", daemon=True).start()
         return later
@@ -287,7 +283,7 @@ class UrInterfaces(Gateway):
         later = Deferred[str | None]()
 
         async def fetching() -> None:
-            later.come(await program_of(host))
+            later.set(await program_of(host))
 
         self._run(fetching())
         return later
@@ -303,11 +299,11 @@ class UrInterfaces(Gateway):
             for lease in self._leases.values():
                 lease.keep_alive()
             now = time.monotonic()
-            self._write(line for throttle in self._throttles for line in throttle.due(now))
+            self._write(line for throttle in self._throttles.values() for line in throttle.due(now))
 
-    def _log(self, throttle: int, line: str) -> None:
-        """Write a line to the server's console, unless one of the throttles has let enough through."""
-        self._write(self._throttles[throttle].take(line, time.monotonic()))
+    def _log(self, what: str, line: str) -> None:
+        """Write a line about a subject to the server's console, unless there were enough of them."""
+        self._write(self._throttles[what].take(line, time.monotonic()))
 
     def _write(self, lines: Iterable[str]) -> None:
         for line in lines:

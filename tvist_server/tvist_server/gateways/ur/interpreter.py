@@ -1,14 +1,14 @@
 """UR's interpreter mode, port 30020: statements for a waiting program, each answered with one line."""
 
+from dataclasses import dataclass, field
+from functools import partial
 from typing import Final, Literal
 
 from msgspec.structs import replace
 
 from tvist_protocol.programs import MAX_SCRIPT, Interpreter, ProgramInterpret, ProgramSkip
 from tvist_protocol.replies import Accepted, Refused
-from tvist_server.gateways.ur.base import InTurnSession, LineSplitter, Send
-from tvist_server.gateways.ur.lease import ConnectionControl
-from tvist_server.gateways.ur.robot import UrRobot
+from tvist_server.gateways.ur.base import InTurnSession, LineSplitter
 
 STATES: Final = {
     "statelastexecuted": "executed",
@@ -22,16 +22,10 @@ SKIPS: Final[dict[str, Literal["statements", "move"]]] = {"skipbuffer": "stateme
 LONGEST: Final = MAX_SCRIPT
 """Longest line [bytes]."""
 ECHO: Final = 4096  # characters of a line that its answer repeats
-NO_PROGRAM, TOO_MANY, SYNTAX, COMPILATION, TOO_LONG = (
-    "Program is in an invalid state",
-    "Too many interpreted messages",
-    "Syntax error",
-    "Compile error",
-    "Statement is too long",
-)
-"""Reasons of a `discard`, by which clients recognize it; all but the last are UR's."""
+TOO_LONG: Final = "Statement is too long"  # reason of a `discard`; the others are UR's
 
 
+@dataclass(eq=False)
 class InterpreterSession(InTurnSession[tuple[str, bool]]):
     """One client of the interpreter mode; a blank line is ignored.
 
@@ -39,9 +33,7 @@ class InterpreterSession(InTurnSession[tuple[str, bool]]):
     `state: NUMBER: question`.
     """
 
-    def __init__(self, robot: UrRobot, control: ConnectionControl, send: Send) -> None:
-        super().__init__(robot, control, send)
-        self._lines = LineSplitter(LONGEST + 1)
+    _lines: LineSplitter = field(default_factory=partial(LineSplitter, LONGEST + 1), init=False)
 
     def receive(self, data: bytes) -> None:
         for line in self._lines.feed(data):
@@ -80,13 +72,13 @@ class InterpreterSession(InTurnSession[tuple[str, bool]]):
 
 
 def _reason(refused: Refused) -> str:
-    """Return the reason of a refusal, with the column if the line is invalid."""
+    """Return the reason of a refusal as UR gives it, with the column if the line is invalid."""
     why, reason = refused.why, ""
     if refused.code == "script_error":
-        reason = SYNTAX if why.startswith("syntax_error") else COMPILATION
+        reason = "Syntax error" if why.startswith("syntax_error") else "Compile error"
         why = f"column {refused.where.rpartition(':')[2]}, {why}"
     elif refused.code == "wrong_mode":
-        reason = NO_PROGRAM
+        reason = "Program is in an invalid state"
     elif (refused.code, refused.where) == ("busy", "text"):
-        reason = TOO_MANY
+        reason = "Too many interpreted messages"
     return f"{reason}: {why}" if reason else why

@@ -20,9 +20,9 @@ MakeCommand = Callable[[str], Command]  # creates a command from the token of th
 class HostLease:
     """Control for the clients of one host; `soon` runs a function in the interfaces' thread."""
 
-    def __init__(self, desk: CommandIntake, host: str, soon: Callable[[Callable[[], None]], None]) -> None:
+    def __init__(self, intake: CommandIntake, host: str, soon: Callable[[Callable[[], None]], None]) -> None:
         self.client = f"ur-{host}"  # name under which the lease is held
-        self._desk, self.host = desk, host
+        self._intake, self.host = intake, host
         self._soon = soon
         self._token = _NO_TOKEN
         self._taking: Deferred[Reply] | None = None  # reply to a pending request for control
@@ -45,7 +45,7 @@ class HostLease:
     def ask(self, command: Command) -> Deferred[Reply]:
         """Send a command that needs no control or already has its token."""
         later = Deferred[Reply]()
-        self._desk.command(command, lambda reply: self._soon(lambda: later.come(reply)), self.host)
+        self._intake.command(command, lambda reply: self._soon(lambda: later.set(reply)), self.host)
         return later
 
     def leave(self, connection: object) -> None:
@@ -59,7 +59,7 @@ class HostLease:
         """Release control, and report the client as gone unless a connection has used control again."""
         await self.ask(ReleaseControl(token=token))
         if not self._users:
-            self._desk.client_gone(self.client)
+            self._intake.client_gone(self.client)
 
     def adopt(self, token: str, holder: object) -> None:
         """Use a lease that another part of the process has taken for this host, and do not release it."""
@@ -72,14 +72,14 @@ class HostLease:
 
     @property
     def held_by_other(self) -> bool:
-        return self._desk.holder() not in {None, self.client}
+        return self._intake.holder() not in {None, self.client}
 
     def _take(self) -> Deferred[Reply]:
         """Take control, once for all connections that need it."""
         taking = self._taking
         if taking is None:
             taking = self._taking = Deferred[Reply]()
-            self._desk.client_seen(self.client)
+            self._intake.client_seen(self.client)
             begin(self._taken(taking))
         return taking
 
@@ -89,8 +89,8 @@ class HostLease:
         if isinstance(reply, Accepted) and reply.token is not None:
             self._token = reply.token
         else:
-            self._desk.client_gone(self.client)
-        taking.come(reply)
+            self._intake.client_gone(self.client)
+        taking.set(reply)
         if not self._users:  # all of them have disconnected since
             self.leave(None)
 
@@ -101,31 +101,31 @@ class ConnectionControl:
     def __init__(
         self,
         lease: HostLease,
-        hear: Callable[[Callable[[], None]], None] = lambda answer: answer(),
+        deliver: Callable[[Callable[[], None]], None] = lambda answer: answer(),
         peer: str | None = None,
     ) -> None:
         self.peer, self.host = peer or lease.client, lease.host
         self._lease = lease
-        self.hear = hear  # handles an answer, which is a function to call
+        self.deliver = deliver  # handles an answer, which is a function to call
         self.unanswered = 0  # number of commands without an answer
 
     def change(self, command: MakeCommand) -> Deferred[Reply]:
         """Send a command that needs control; it is refused if another client has it."""
-        return self._heard(self._lease.change(self, command))
+        return self._delivered(self._lease.change(self, command))
 
     def ask(self, command: Command) -> Deferred[Reply]:
-        return self._heard(self._lease.ask(command))
+        return self._delivered(self._lease.ask(command))
 
-    def _heard(self, reply: Awaitable[Reply]) -> Deferred[Reply]:
+    def _delivered(self, reply: Awaitable[Reply]) -> Deferred[Reply]:
         heard = Deferred[Reply]()
-        begin(self._hear(reply, heard))
+        begin(self._wait_for(reply, heard))
         return heard
 
-    async def _hear(self, awaited: Awaitable[Reply], heard: Deferred[Reply]) -> None:
+    async def _wait_for(self, awaited: Awaitable[Reply], heard: Deferred[Reply]) -> None:
         self.unanswered += 1
         reply = await awaited
         self.unanswered -= 1
-        self.hear(lambda: heard.come(reply))
+        self.deliver(lambda: heard.set(reply))
 
     @property
     def held_by_other(self) -> bool:
@@ -134,7 +134,7 @@ class ConnectionControl:
 
     def lasting(self) -> "ConnectionControl":
         """Return another access for the same host, which survives the connection."""
-        return ConnectionControl(self._lease, self.hear, self.peer)
+        return ConnectionControl(self._lease, self.deliver, self.peer)
 
     def leave(self) -> None:
         """Release control, when the connection or its lasting access has ended."""

@@ -1,103 +1,77 @@
-"""Robot messages: int32 length, uint8 20, uint64 time [µs], uint8 source, uint8 kind, body; big-endian."""
+"""Robot messages: int32 length, uint8 20, uint64 time [µs], uint8 source, uint8 kind, body; big-endian.
 
-from enum import IntEnum
-from struct import Struct
+Their time is that of the last tick, None before the first.
+"""
+
+from struct import Struct, pack
 from typing import Final
 
 from tvist_controller.instruments.snapshot import Snapshot
+from tvist_server.gateways.ur.version import DATE, VERSION
 
-ROBOT_MESSAGE: Final = 20
-SOURCE: Final = 254  # source -2: neither a joint nor a board
-LONGEST: Final = 1000
-"""Longest text [bytes]: some clients reject packages of more than 2000 bytes."""
-
-PROTECTIVE_STOP: Final = 209
-READ_ONLY: Final = 210
+LONGEST: Final = 1000  # longest text [bytes]: some clients reject packages of more than 2000 bytes
+WARNING, VIOLATION = 2, 3  # UR's levels of severity of an error code
+PROTECTIVE_STOP, READ_ONLY = 209, 210  # UR's error codes
 
 _HEADER = Struct(">iBQBB")
-_ERROR = Struct(">iiiII")
-_SAFETY = Struct(">iiBII")
-_PLACE = Struct(">ii")
-_KEY = Struct(">iiB")
-_POPUP = Struct(">IB???B")
-_NUMBER = Struct(">i")
-_VERSION = Struct(">BBii")
 
 
-class MessageKind(IntEnum):
-    """UR's numbers of the robot messages that are sent here."""
-
-    TEXT = 0
-    LABEL = 1
-    POPUP = 2
-    VERSION = 3
-    SAFETY_MODE = 5
-    ERROR_CODE = 6
-    KEY = 7
-    RUNTIME_EXCEPTION = 10
-
-
-class ErrorLevel(IntEnum):
-    """UR's levels of severity of an error code that are sent here."""
-
-    WARNING = 2
-    VIOLATION = 3
-
-
-def stamp(snapshot: Snapshot | None) -> int:
+def stamp(tick: Snapshot | None) -> int:
     """Return the time of a tick for a package [µs]; 0 before the first tick."""
-    return 0 if snapshot is None else round(1e6 * snapshot.timestamp)
+    return 0 if tick is None else round(1e6 * tick.timestamp)
 
 
-def version(major: int, minor: int, bugfix: int, build: int, date: str) -> bytes:
+def version() -> bytes:
     """Encode the software version, the first message that a client gets."""
     name = b"URControl"
-    body = bytes([len(name)]) + name + _VERSION.pack(major, minor, bugfix, build) + _text(date)
-    return _message(0, MessageKind.VERSION, body)
+    body = bytes([len(name)]) + name + pack(">BBii", *VERSION) + _text(DATE)
+    return _message(None, 3, body)
 
 
-def text(time: int, what: str) -> bytes:
+def text(tick: Snapshot | None, what: str) -> bytes:
     """Encode a line for the log."""
-    return _message(time, MessageKind.TEXT, _text(what))
+    return _message(tick, 0, _text(what))
 
 
-def label(time: int, number: int, name: str) -> bytes:
+def label(tick: Snapshot | None, number: int, name: str) -> bytes:
     """Encode the line of the program tree, by number and name, that a program has reached."""
-    return _message(time, MessageKind.LABEL, _NUMBER.pack(number) + _text(name))
+    return _message(tick, 1, pack(">i", number) + _text(name))
 
 
-def key(time: int, title: str, what: str) -> bytes:
+def key(tick: Snapshot | None, title: str, what: str) -> bytes:
     """Encode that a program has started or stopped: `PROGRAM_XXX_STARTED` or `PROGRAM_XXX_STOPPED`, and its name."""
     head = _text(title, 255)
-    return _message(time, MessageKind.KEY, _KEY.pack(0, 0, len(head)) + head + _text(what))
+    return _message(tick, 7, pack(">iiB", 0, 0, len(head)) + head + _text(what))
 
 
-def runtime_exception(time: int, line: int, column: int, what: str) -> bytes:
+def runtime_exception(tick: Snapshot | None, line: int, column: int, what: str) -> bytes:
     """Encode why a program cannot continue or start; line and column count from 1."""
-    return _message(time, MessageKind.RUNTIME_EXCEPTION, _PLACE.pack(line, column) + _text(what))
+    return _message(tick, 10, pack(">ii", line, column) + _text(what))
 
 
-def error_code(time: int, code: int, argument: int, level: ErrorLevel, what: str) -> bytes:
-    """Encode an error by its number, without data."""
-    return _message(time, MessageKind.ERROR_CODE, _ERROR.pack(code, argument, level, 0, 0) + _text(what))
+def error_code(tick: Snapshot | None, code: int, level: int, what: str) -> bytes:
+    """Encode an error by its number, without an argument or data."""
+    return _message(tick, 6, pack(">iiiII", code, 0, level, 0, 0) + _text(what))
 
 
-def safety_mode(time: int, mode: int) -> bytes:
-    """Encode a change to a safety mode, given as RTDE's number."""
-    return _message(time, MessageKind.SAFETY_MODE, _SAFETY.pack(0, 0, mode & 0xFF, 0, 0))
+def safety_mode(tick: Snapshot) -> bytes:
+    """Encode a change to the safety mode of a tick."""
+    return _message(tick, 5, pack(">iiBII", 0, 0, tick.safety_mode & 0xFF, 0, 0))
 
 
 def popup(
-    time: int, title: str, what: str, *, warning: bool = False, error: bool = False, blocking: bool = False
+    tick: Snapshot | None, title: str, what: str, *, level: str | None = None, blocking: bool = False
 ) -> bytes:
     """Encode a window for the operator; if it is `blocking`, the program waits until it is closed."""
     head = _text(title, 255)
-    body = _POPUP.pack(0, 0, warning, error, blocking, len(head)) + head + _text(what)
-    return _message(time, MessageKind.POPUP, body)
+    flags = pack(">IB???B", 0, 0, level == "warning", level == "error", blocking, len(head))
+    return _message(tick, 2, flags + head + _text(what))
 
 
-def _message(time: int, kind: MessageKind, body: bytes) -> bytes:
-    return _HEADER.pack(_HEADER.size + len(body), ROBOT_MESSAGE, time, SOURCE, kind) + body
+def _message(tick: Snapshot | None, kind: int, body: bytes) -> bytes:
+    """Return a message; `kind` is UR's number of that message."""
+    source = 254  # -2: neither a joint nor a board
+    return _HEADER.pack(_HEADER.size + len(body), 20, stamp(tick), source, kind) + body
 
 
 def _text(what: str, most: int = LONGEST) -> bytes:

@@ -51,11 +51,11 @@ class Programs:
         self._label: ProgramLabel | None = None
         self._control: ConnectionControl | None = None
         """Access of the client that plays the program, kept as long as the program, even if it disconnects."""
-        self._beginning: list[ConnectionControl] = []
+        self._starting_controls: list[ConnectionControl] = []
         """Accesses of clients whose secondary programs are accepted but not started."""
-        self._beside: list[ConnectionControl] = []
+        self._secondary_controls: list[ConnectionControl] = []
         """Accesses of clients whose secondary programs run; kept until no secondary program runs."""
-        self._running_beside = 0
+        self._running_secondary = 0
         self._asked: object | None = None
         """Pending request to play, while the text is being found; None: no request."""
 
@@ -92,12 +92,12 @@ class Programs:
         reply = await lasting.change(lambda token: ProgramRun(token=token, text=text))
         if isinstance(reply, Refused):
             lasting.leave()
-            self._except(reply)
+            self._report_script_error(reply)
             return reply
         if secondary:
-            self._beginning.append(lasting)
+            self._starting_controls.append(lasting)
         else:
-            self._hold(lasting)
+            self._keep_control(lasting)
         return None
 
     async def play(self, control: ConnectionControl) -> bool:
@@ -118,7 +118,7 @@ class Programs:
                 return False
             reply = await control.ask(ProgramLoad(name=name, text=whole))
             if isinstance(reply, Refused):
-                self._except(reply)
+                self._report_script_error(reply)
                 return False
         if not wanted():
             return False
@@ -126,7 +126,7 @@ class Programs:
         if isinstance(await lasting.change(lambda token: ProgramPlay(token=token)), Refused):
             lasting.leave()
             return False
-        self._hold(lasting)
+        self._keep_control(lasting)
         self._become("PLAYING")
         return True
 
@@ -153,42 +153,34 @@ class Programs:
         if io.program_label != self._label:
             self._label = io.program_label
             if self._label is not None:
-                stamp = messages.stamp(self._host.latest)
-                self._host.tell(messages.label(stamp, self._label.number, self._label.name))
+                self._host.tell(messages.label(self._host.latest, self._label.number, self._label.name))
         self.interpreter = io.interpreter or Interpreter()
 
     def event(self, event: Event) -> None:
-        stamp, program = messages.stamp(self._host.latest), event.program or ""
+        now, why, title = self._host.latest, event.why or "", _title(event.program or "")
         match event.kind:
             case "program_started" | "program_stopped" if event.secondary:
-                self._count_beside(started=event.kind == "program_started")
+                self._count_secondary(started=event.kind == "program_started")
             case "program_started":
-                self._host.tell(messages.key(stamp, "PROGRAM_XXX_STARTED", _title(program)))
+                self._host.tell(messages.key(now, "PROGRAM_XXX_STARTED", title))
             case "program_stopped":
-                self._host.tell(messages.key(stamp, "PROGRAM_XXX_STOPPED", _title(program)))
+                self._host.tell(messages.key(now, "PROGRAM_XXX_STOPPED", title))
             case "text":
-                self._host.tell(messages.text(stamp, event.why or ""))
+                self._host.tell(messages.text(now, why))
             case "popup":
-                shown = messages.popup(
-                    stamp,
-                    event.title or "",
-                    event.why or "",
-                    warning=event.level == "warning",
-                    error=event.level == "error",
-                    blocking=bool(event.blocking),
+                blocking = bool(event.blocking)
+                self._host.tell(
+                    messages.popup(now, event.title or "", why, level=event.level, blocking=blocking)
                 )
-                self._host.tell(shown)
             case "warning" if event.line is not None:
-                why = event.why or ""
-                self._host.tell(messages.runtime_exception(stamp, event.line, event.column or 1, why))
+                self._host.tell(messages.runtime_exception(now, event.line, event.column or 1, why))
 
-    def _except(self, refused: Refused) -> None:
+    def _report_script_error(self, refused: Refused) -> None:
         """Report to all clients where the text of a program is invalid."""
         place = _PLACE.fullmatch(refused.where)
         if refused.code == "script_error" and place is not None:
             line, column = map(int, place.groups())
-            stamp = messages.stamp(self._host.latest)
-            self._host.tell(messages.runtime_exception(stamp, line, column, refused.why))
+            self._host.tell(messages.runtime_exception(self._host.latest, line, column, refused.why))
 
     def _changed(self, state: ProgramState, reply: Reply) -> bool:
         done = not isinstance(reply, Refused)
@@ -199,23 +191,23 @@ class Programs:
     def _become(self, state: ProgramState) -> None:
         self.state = state
         if state == "STOPPED":
-            self._hold(None)
+            self._keep_control(None)
 
-    def _hold(self, control: ConnectionControl | None) -> None:
+    def _keep_control(self, control: ConnectionControl | None) -> None:
         before, self._control = self._control, control
         if before is not None:
             before.leave()
 
-    def _count_beside(self, *, started: bool) -> None:
+    def _count_secondary(self, *, started: bool) -> None:
         """Count the secondary programs, and release the accesses when none runs."""
         if started:
-            self._running_beside += 1
-            self._beside += self._beginning
-            self._beginning = []
+            self._running_secondary += 1
+            self._secondary_controls += self._starting_controls
+            self._starting_controls = []
             return
-        self._running_beside = max(self._running_beside - 1, 0)
-        if self._running_beside == 0:
-            ended, self._beside = self._beside, []
+        self._running_secondary = max(self._running_secondary - 1, 0)
+        if self._running_secondary == 0:
+            ended, self._secondary_controls = self._secondary_controls, []
             for control in ended:
                 control.leave()
 

@@ -7,48 +7,18 @@ from tvist_controller.instruments.snapshot import Snapshot
 from tvist_server.gateways.ur.primary.session import ScriptSession
 
 LAYOUT: Final[tuple[tuple[str | None, int], ...]] = (
-    ("timestamp", 1),
-    ("target_q", 6),
-    ("target_qd", 6),
-    ("target_qdd", 6),
-    ("target_current", 6),
-    ("target_moment", 6),
-    ("actual_q", 6),
-    ("actual_qd", 6),
-    ("actual_current", 6),
-    ("joint_control_output", 6),
-    ("actual_TCP_pose", 6),
-    ("actual_TCP_speed", 6),
-    ("actual_TCP_force", 6),
-    ("target_TCP_pose", 6),
-    ("target_TCP_speed", 6),
-    ("actual_digital_input_bits", 1),
-    ("joint_temperatures", 6),
-    ("actual_execution_time", 1),
-    (None, 1),  # test value, for UR's own use
-    ("robot_mode", 1),
-    ("joint_mode", 6),
-    ("safety_mode", 1),
-    (None, 6),
-    ("actual_tool_accelerometer", 3),
-    (None, 6),
-    ("speed_scaling", 1),
-    ("actual_momentum", 1),
-    (None, 2),
-    ("actual_main_voltage", 1),
-    ("actual_robot_voltage", 1),
-    ("actual_robot_current", 1),
-    ("actual_joint_voltage", 6),
-    ("actual_digital_output_bits", 1),
-    ("runtime_state", 1),
-    ("elbow_position", 3),
-    ("elbow_velocity", 3),
-    ("safety_status", 1),
-    (None, 3),
-    ("payload", 1),
-    ("payload_cog", 3),
-    ("payload_inertia", 6),
-)
+    ("timestamp", 1), ("target_q", 6), ("target_qd", 6), ("target_qdd", 6), ("target_current", 6),
+    ("target_moment", 6), ("actual_q", 6), ("actual_qd", 6), ("actual_current", 6),
+    ("joint_control_output", 6), ("actual_TCP_pose", 6), ("actual_TCP_speed", 6),
+    ("actual_TCP_force", 6), ("target_TCP_pose", 6), ("target_TCP_speed", 6),
+    ("actual_digital_input_bits", 1), ("joint_temperatures", 6), ("actual_execution_time", 1),
+    (None, 1), ("robot_mode", 1), ("joint_mode", 6), ("safety_mode", 1), (None, 6),
+    ("actual_tool_accelerometer", 3), (None, 6), ("speed_scaling", 1), ("actual_momentum", 1),
+    (None, 2), ("actual_main_voltage", 1), ("actual_robot_voltage", 1), ("actual_robot_current", 1),
+    ("actual_joint_voltage", 6), ("actual_digital_output_bits", 1), ("runtime_state", 1),
+    ("elbow_position", 3), ("elbow_velocity", 3), ("safety_status", 1), (None, 3), ("payload", 1),
+    ("payload_cog", 3), ("payload_inertia", 6),
+)  # fmt: skip
 """Doubles of the package: attribute of the snapshot and its length; reserved ones have no name and are 0."""
 
 PACKAGE: Final = Struct(f">i{sum(count for _, count in LAYOUT)}d")
@@ -77,7 +47,7 @@ class RealtimeSession(ScriptSession):
     """One client of the real-time interface; its input is URScript, ignored on the read-only port."""
 
     def receive(self, data: bytes) -> None:
-        if not self._read_only:
+        if not self.read_only:
             super().receive(data)
 
     def sample(self, snapshot: Snapshot) -> bytes:

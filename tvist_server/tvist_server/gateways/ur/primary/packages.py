@@ -3,7 +3,7 @@
 int32 length, uint8 16, then the parts: uint32 length (including itself), uint8 number, body; big-endian.
 """
 
-from struct import Struct
+from struct import Struct, pack
 from typing import Final
 
 from tvist_controller.instruments.snapshot import Snapshot
@@ -13,11 +13,6 @@ from tvist_server.gateways.ur import messages
 from tvist_server.ur_model import series
 from tvist_server.ur_ports import MOST_JOINTS
 
-ROBOT_STATE: Final = 16
-NOMINAL: Final = 0xFFFFFFFF
-SUBTYPE: Final = 3  # robot subtype of an e-Series arm
-BOARD_TEMPERATURE: Final = 25.0  # temperature of the boards [°C]
-FULL_SPEED: Final = 1.0
 MOTION_DEFAULTS: Final = (1.0471975511965976, 1.3962634015954636, 0.25, 1.2, 0.25)
 """Defaults of a new program: joint velocity [rad/s] and acceleration [rad/s²], tool velocity [m/s] and
 acceleration [m/s²], and the radius that converts rotation to translation [m]."""
@@ -25,15 +20,7 @@ _TYPES: Final = {"UR5": 1, "UR10": 2, "UR3": 3, "UR16": 4, "UR20": 7, "UR30": 8}
 
 _PACKAGE = Struct(">iB")
 _PART = Struct(">IB")
-_MODE = Struct(">Q7?BB3dB")
 _JOINT = Struct(">3d4fB")
-_CARTESIAN = Struct(">12d")
-_KINEMATICS = Struct(">6I24dI")
-_MASTERBOARD = Struct(">IIbbddbbddffffBBBIBBB")
-_TOOL = Struct(">bbddfBffB")
-_CONFIGURATION = Struct(">53d4i")
-_FORCE = Struct(">7d")
-_TOOL_LINE = Struct(">Biiiff")
 _KEY: Final = "robot state"
 
 
@@ -44,20 +31,20 @@ def robot_state(description: RobotDescription, snapshot: Snapshot) -> bytes:
         body = b"".join((
             _part(0, _robot_mode(snapshot)),
             _part(1, _joints(snapshot)),
-            _part(4, _CARTESIAN.pack(*snapshot.actual_TCP_pose, *snapshot.tcp_offset)),
+            _part(4, pack(">12d", *snapshot.actual_TCP_pose, *snapshot.tcp_offset)),
             _part(5, _kinematics(description)),
             _part(9, bytes(48)),  # for UR's own calibration
             _part(3, _masterboard(snapshot)),
             _part(2, _tool(snapshot)),
             _part(6, _configuration(description)),
-            _part(7, _FORCE.pack(*snapshot.actual_TCP_force, 0.0)),  # dexterity, the last value, is not computed
+            _part(7, pack(">7d", *snapshot.actual_TCP_force, 0.0)),  # dexterity, the last value, is not computed
             _part(8, bytes((0, 1, 0, 1))),  # teach button, and the one on the flange: not pressed, enabled
             _part(10, bytes(38)),  # for UR's own safety check
-            _part(11, _TOOL_LINE.pack(0, 115200, 0, 1, 1.5, 3.5)),  # off; baud, parity, stop bits, idle characters
+            _part(11, pack(">Biiiff", 0, 115200, 0, 1, 1.5, 3.5)),  # off; baud, parity, stop bits, idle characters
             _part(12, bytes((snapshot.tool_output_mode, snapshot.tool_digital_output0_mode,
                              snapshot.tool_digital_output1_mode))),
         ))  # fmt: skip
-        made = snapshot.shared[_KEY] = _PACKAGE.pack(_PACKAGE.size + len(body), ROBOT_STATE) + body
+        made = snapshot.shared[_KEY] = _PACKAGE.pack(_PACKAGE.size + len(body), 16) + body
     return made
 
 
@@ -72,7 +59,8 @@ def _part(number: int, body: bytes) -> bytes:
 
 def _robot_mode(snapshot: Snapshot) -> bytes:
     emergency = (SafetyMode.SYSTEM_EMERGENCY_STOP, SafetyMode.ROBOT_EMERGENCY_STOP)
-    return _MODE.pack(
+    return pack(
+        ">Q7?BB3dB",
         messages.stamp(snapshot),
         True,  # the arm is connected
         True,  # and may be moved
@@ -85,7 +73,7 @@ def _robot_mode(snapshot: Snapshot) -> bytes:
         0,  # control by position
         snapshot.target_speed_fraction,
         snapshot.speed_scaling,
-        FULL_SPEED,
+        1.0,  # full speed
         0,
     )
 
@@ -108,12 +96,13 @@ def _joints(snapshot: Snapshot) -> bytes:
 def _kinematics(description: RobotDescription) -> bytes:
     a, d, alpha = _denavit_hartenberg(description)
     theta = [0.0] * MOST_JOINTS
-    return _KINEMATICS.pack(*[NOMINAL] * MOST_JOINTS, *theta, *a, *d, *alpha, 0)
+    return pack(">6I24dI", *[0xFFFFFFFF] * MOST_JOINTS, *theta, *a, *d, *alpha, 0)
 
 
 def _masterboard(snapshot: Snapshot) -> bytes:
     types = [snapshot.analog_io_types >> bit & 1 for bit in range(4)]
-    return _MASTERBOARD.pack(
+    return pack(
+        ">IIbbddbbddffffBBBIBBB",
         snapshot.actual_digital_input_bits,
         snapshot.actual_digital_output_bits,
         *types[:2],
@@ -122,7 +111,7 @@ def _masterboard(snapshot: Snapshot) -> bytes:
         *types[2:],
         snapshot.standard_analog_output0,
         snapshot.standard_analog_output1,
-        BOARD_TEMPERATURE,
+        25.0,  # temperature of the boards [°C]
         snapshot.actual_robot_voltage,
         snapshot.actual_robot_current,
         snapshot.io_current,
@@ -137,7 +126,8 @@ def _masterboard(snapshot: Snapshot) -> bytes:
 
 
 def _tool(snapshot: Snapshot) -> bytes:
-    return _TOOL.pack(
+    return pack(
+        ">bbddfBffB",
         snapshot.tool_analog_input_types & 1,
         snapshot.tool_analog_input_types >> 1 & 1,
         snapshot.tool_analog_input0,
@@ -158,8 +148,8 @@ def _configuration(description: RobotDescription) -> bytes:
     ]
     a, d, alpha = _denavit_hartenberg(description)
     theta = [0.0] * MOST_JOINTS
-    numbers = (6, 4, robot_type(description), SUBTYPE)  # masterboard, box, arm
-    return _CONFIGURATION.pack(*position, *motion, *MOTION_DEFAULTS, *a, *d, *alpha, *theta, *numbers)
+    numbers = (6, 4, robot_type(description), 3)  # masterboard, box, arm, e-Series
+    return pack(">53d4i", *position, *motion, *MOTION_DEFAULTS, *a, *d, *alpha, *theta, *numbers)
 
 
 def _denavit_hartenberg(description: RobotDescription) -> tuple[list[float], list[float], list[float]]:

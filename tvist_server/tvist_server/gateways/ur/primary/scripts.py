@@ -59,7 +59,7 @@ class Unit:
         return lines[min(self.line, len(lines)) - 1].strip()
 
 
-class Intake:
+class ScriptReader:
     """One client's stream of script text, which may be split anywhere."""
 
     def __init__(self) -> None:

@@ -1,19 +1,17 @@
 """Sessions of the primary and secondary interface, and their common base with the real-time interface."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Final
 
 from tvist_controller.instruments.snapshot import Snapshot
 from tvist_protocol.replies import Refused
 from tvist_protocol.stream import Event
-from tvist_server.gateways.ur import messages, power, version
-from tvist_server.gateways.ur.base import InTurnSession, Send
-from tvist_server.gateways.ur.lease import ConnectionControl
-from tvist_server.gateways.ur.messages import ErrorLevel
+from tvist_server.gateways.ur import messages, power
+from tvist_server.gateways.ur.base import InTurnSession
 from tvist_server.gateways.ur.power import Change
 from tvist_server.gateways.ur.primary.packages import robot_state
-from tvist_server.gateways.ur.primary.scripts import LONGEST, Intake, Unit
-from tvist_server.gateways.ur.robot import UrRobot
+from tvist_server.gateways.ur.primary.scripts import LONGEST, ScriptReader, Unit
 
 STATE_TICKS: Final = 50  # ticks between two robot states: 10 Hz
 TOO_LONG: Final = f"program_too_long: it has more than {LONGEST} bytes and was thrown away"
@@ -31,22 +29,19 @@ CHANGES: Final[Mapping[str, Change]] = {
 """The interface's own commands that change the robot's mode."""
 
 
+@dataclass(eq=False)
 class ScriptSession(InTurnSession[Unit]):
     """Runs a few commands of the interface, and other script text as programs; the console shows the results."""
 
-    def __init__(
-        self, robot: UrRobot, control: ConnectionControl, send: Send, *, read_only: bool = False
-    ) -> None:
-        super().__init__(robot, control, send)
-        self._read_only = read_only  # whether the client's commands are refused
-        self._intake = Intake()
+    read_only: bool = field(default=False, kw_only=True)  # whether commands are refused
+    _reader: ScriptReader = field(default_factory=ScriptReader, init=False)
 
     def receive(self, data: bytes) -> None:
-        for unit in self._intake.feed(data):
-            self._add(unit, stop=not self._read_only and len(unit.text) < SHORT and unit.words == STOP)
+        for unit in self._reader.feed(data):
+            self._add(unit, stop=not self.read_only and len(unit.text) < SHORT and unit.words == STOP)
 
     def closed(self) -> None:
-        unfinished = self._intake.unfinished
+        unfinished = self._reader.unfinished
         if unfinished is not None:
             self._report(unfinished, "was not run: the connection ended before its last line feed")
         super().closed()
@@ -56,12 +51,12 @@ class ScriptSession(InTurnSession[Unit]):
 
     async def _do(self, unit: Unit) -> None:
         words = unit.words if len(unit.text) < SHORT else ""
-        if self._read_only:
+        if self.read_only:
             self._tell_read_only()
             self._report_refusal(unit, "this port is read-only")
         elif unit.too_long:
-            stamp = messages.stamp(self._robot.latest)
-            self._robot.tell(messages.runtime_exception(stamp, unit.line, unit.column, TOO_LONG))
+            exception = messages.runtime_exception(self._robot.latest, unit.line, unit.column, TOO_LONG)
+            self._robot.tell(exception)
             self._report_refusal(unit, f"it has more than {LONGEST} bytes")
         elif words == STOP:
             stopped = await self._robot.programs.stop(self._control)
@@ -88,13 +83,12 @@ class ScriptSession(InTurnSession[Unit]):
         if refused.code in {"no_control", "stale_token"}:
             self._tell_read_only()
         else:
-            stamp = messages.stamp(self._robot.latest)
-            self._tell(messages.text(stamp, f"{what} was refused: {refused.why}"))
+            self._tell(messages.text(self._robot.latest, f"{what} was refused: {refused.why}"))
         self._report_refusal(unit, refused.why)
 
     def _tell_read_only(self) -> None:
-        stamp = messages.stamp(self._robot.latest)
-        self._tell(messages.error_code(stamp, messages.READ_ONLY, 0, ErrorLevel.VIOLATION, READ_ONLY))
+        number, level = messages.READ_ONLY, messages.VIOLATION
+        self._tell(messages.error_code(self._robot.latest, number, level, READ_ONLY))
 
     def _report(self, unit: Unit, what: str) -> None:
         self._robot.report(f'the script "{unit.title}" of {self._control.peer} {what}')
@@ -103,29 +97,18 @@ class ScriptSession(InTurnSession[Unit]):
         self._robot.report_refusal(f'the script "{unit.title}" of {self._control.peer} was refused: {why}')
 
 
+@dataclass(eq=False)
 class PrimarySession(ScriptSession):
     """Sends a client the robot's state and messages, and takes its commands; the secondary one has no messages."""
 
-    def __init__(
-        self,
-        robot: UrRobot,
-        control: ConnectionControl,
-        send: Send,
-        *,
-        read_only: bool = False,
-        informed: bool = True,
-    ) -> None:
-        super().__init__(robot, control, send, read_only=read_only)
-        self.informed = informed
-        self._errors: list[bytes] = []  # error codes of this tick, which are sent after its state
-        self._due = 0  # tick of the next robot state
-        self._safety_mode: int | None = None  # safety mode last sent to the client, which only gets changes
+    informed: bool = field(default=True, kw_only=True)
+    _errors: list[bytes] = field(default_factory=list, init=False)  # sent after the state of the tick
+    _due: int = field(default=0, init=False)  # tick of the next robot state
+    _safety_mode: int | None = field(default=None, init=False)  # last sent to the client
 
     def opened(self) -> None:
         """Send the version; the first robot state follows with the next tick."""
-        self._send(
-            messages.version(version.MAJOR, version.MINOR, version.BUGFIX, version.BUILD, version.DATE)
-        )
+        self._send(messages.version())
 
     def _tell(self, message: bytes) -> None:
         if self.informed:
@@ -136,7 +119,7 @@ class PrimarySession(ScriptSession):
         mode = snapshot.safety_mode
         if mode != self._safety_mode:
             if self._safety_mode is not None:
-                self._tell(messages.safety_mode(messages.stamp(snapshot), mode))
+                self._tell(messages.safety_mode(snapshot))
                 self._send(robot_state(self._robot.description, snapshot))
             self._safety_mode = mode
         for error in self._errors:
@@ -154,11 +137,9 @@ class PrimarySession(ScriptSession):
 
     def event(self, event: Event) -> None:
         """Send a protective stop as an error, other safety stops and warnings as text; `Programs` reports programs."""
-        stamp = messages.stamp(self._robot.latest)
-        why = event.why or ""
+        now, why = self._robot.latest, event.why or ""
         if event.kind == "protective_stop":
-            self._errors.append(
-                messages.error_code(stamp, messages.PROTECTIVE_STOP, 0, ErrorLevel.WARNING, why)
-            )
+            number, level = messages.PROTECTIVE_STOP, messages.WARNING
+            self._errors.append(messages.error_code(now, number, level, why))
         elif event.kind == "safety_stop" or (event.kind == "warning" and event.line is None):
-            self._tell(messages.text(stamp, why))
+            self._tell(messages.text(now, why))

@@ -10,8 +10,8 @@ import numpy as np
 
 from tvist_controller.instruments.snapshot import Snapshot
 from tvist_protocol.io import Io
-from tvist_server.gateways.ur.rtde.outputs import OUTPUTS, PARTS, OutputSource
 from tvist_server.gateways.ur.rtde.recipes import OutputRecipe
+from tvist_server.gateways.ur.rtde.variables import OUTPUTS, PARTS, OutputSource
 from tvist_server.rtde.codec import HEADER, PackageKind
 
 

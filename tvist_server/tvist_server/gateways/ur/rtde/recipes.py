@@ -3,8 +3,7 @@
 from itertools import accumulate, islice
 from struct import Struct
 
-from tvist_server.gateways.ur.rtde.inputs import INPUTS
-from tvist_server.gateways.ur.rtde.outputs import OUTPUTS
+from tvist_server.gateways.ur.rtde.variables import INPUTS, OUTPUTS
 from tvist_server.rtde.codec import HEADER, LARGEST
 
 Value = int | float | tuple[float, ...]

@@ -6,54 +6,53 @@ and no source in text messages.
 
 from collections.abc import Callable, Mapping
 from math import floor
-from struct import Struct
+from struct import Struct, pack
 
 from tvist_controller.instruments.snapshot import Snapshot
-from tvist_server.gateways.ur import version
 from tvist_server.gateways.ur.base import PortSession, Send
 from tvist_server.gateways.ur.lease import ConnectionControl
 from tvist_server.gateways.ur.robot import UrRobot
-from tvist_server.gateways.ur.rtde.inputs import INPUTS, NEED_CONTROL
 from tvist_server.gateways.ur.rtde.package_encoder import PackageEncoder
 from tvist_server.gateways.ur.rtde.recipes import InputRecipe, OutputRecipe, split
+from tvist_server.gateways.ur.rtde.variables import INPUTS, NEED_CONTROL
 from tvist_server.gateways.ur.rtde.writing import InputWriter
-from tvist_server.rtde.codec import PackageKind, PackageReader, TextLevel, package, text_message, words
+from tvist_server.gateways.ur.version import VERSION
+from tvist_server.rtde.codec import PackageKind, PackageReader, package, warning, words
 
 RATE = 500.0  # frequency of the control loop and highest frequency of data packages [Hz]
 RECIPES = 255  # largest number of input recipes of a connection: their ids are 1 to 255
-SENTENCES = 64
+MAX_WARNINGS = 64
 """Largest number of text messages between two starts, because a client may send wrong packages for days."""
 OUTPUT_ID = b"\x01"  # id of the output recipe: a connection has only one
 
 _UINT16 = Struct(">H")
 _DOUBLE = Struct(">d")
-_VERSION = Struct(">4I")
 _TRUE, _FALSE = b"\x01", b"\x00"
 
 
 class RtdeSession(PortSession):
     """Answers the packages of one client and sends it the outputs that it has subscribed to.
 
-    `boards` has a board for each number of ticks between two packages, so that variables of slow clients are not
+    `encoders` has an encoder for each number of ticks between two packages, so that variables of slow clients are not
     computed for the others.
     """
 
     client_begins = True
 
     def __init__(
-        self, robot: UrRobot, control: ConnectionControl, send: Send, boards: Mapping[int, PackageEncoder]
+        self, robot: UrRobot, control: ConnectionControl, send: Send, encoders: Mapping[int, PackageEncoder]
     ) -> None:
         super().__init__(robot, control, send)
-        self._boards, self._board = boards, boards[1]
+        self._encoders, self._encoder = encoders, encoders[1]
         self._reader = PackageReader()
-        self._writer = InputWriter(robot, control, self._complain)
+        self._writer = InputWriter(robot, control, self._warn)
         self._version = 1
         self._head = b""
         self._outputs: OutputRecipe | None = None
         self._inputs: list[InputRecipe] = []
         self._every = 1
         self._next: int | None = None
-        self._said: set[str] = set()
+        self._warned: set[str] = set()
         self._handlers: dict[int, Callable[[bytes], None]] = {
             PackageKind.REQUEST_PROTOCOL_VERSION: self._request_version,
             PackageKind.GET_URCONTROL_VERSION: self._tell_version,
@@ -70,7 +69,7 @@ class RtdeSession(PortSession):
         for kind, payload in self._reader.feed(data):
             handler = self._handlers.get(kind)
             if handler is None:
-                self._complain(f"there is no package of type {kind}")
+                self._warn(f"there is no package of type {kind}")
             else:
                 handler(payload)
 
@@ -84,11 +83,11 @@ class RtdeSession(PortSession):
         if tick < self._next:
             return b""
         self._next += every * ((tick - self._next) // every + 1)
-        return self._board.package(self._outputs, snapshot, self._head)
+        return self._encoder.package(self._outputs, snapshot, self._head)
 
     def closed(self) -> None:
         self._robot.inputs.release(self)
-        self._board.end(self)
+        self._encoder.end(self)
         super().closed()
 
     def _request_version(self, payload: bytes) -> None:
@@ -100,8 +99,7 @@ class RtdeSession(PortSession):
         self._send(package(PackageKind.REQUEST_PROTOCOL_VERSION, _TRUE if accepted else _FALSE))
 
     def _tell_version(self, _payload: bytes) -> None:
-        numbers = version.MAJOR, version.MINOR, version.BUGFIX, version.BUILD
-        self._send(package(PackageKind.GET_URCONTROL_VERSION, _VERSION.pack(*numbers)))
+        self._send(package(PackageKind.GET_URCONTROL_VERSION, pack(">4I", *VERSION)))
 
     def _set_up_outputs(self, payload: bytes) -> None:
         """Replace the output recipe; answer with types and, in version 2, an id: 0 if the recipe is invalid."""
@@ -113,7 +111,7 @@ class RtdeSession(PortSession):
         recipe = OutputRecipe(split(payload))
         self._outputs = recipe if recipe.valid else None
         self._every, self._next = ticks_between(frequency), None
-        self._read()
+        self._register()
         number = OUTPUT_ID if recipe.valid else _FALSE
         head = b"" if self._version == 1 else number
         self._send(words(PackageKind.SETUP_OUTPUTS, head, recipe.words))
@@ -145,31 +143,31 @@ class RtdeSession(PortSession):
         if 0 < number <= len(self._inputs):
             self._writer.write(self._inputs[number - 1].values(payload[1:]))
         else:
-            self._complain(f"there is no input recipe {number}")
+            self._warn(f"there is no input recipe {number}")
 
     def _start(self, _payload: bytes) -> None:
         self.served, self._next = self._outputs is not None, None
-        self._read()
-        self._said.clear()
+        self._register()
+        self._warned.clear()
         self._send(package(PackageKind.START, _TRUE if self.served else _FALSE))
 
     def _pause(self, _payload: bytes) -> None:
         self.served = False
-        self._read()
+        self._register()
         self._send(package(PackageKind.PAUSE, _TRUE))
 
-    def _read(self) -> None:
-        """Register the recipe with its board while the client reads it."""
-        self._board.end(self)
+    def _register(self) -> None:
+        """Register the recipe with its encoder while the client reads it."""
+        self._encoder.end(self)
         if self.served and self._outputs is not None:
-            self._board = self._boards[self._every]
-            self._board.begin(self, self._outputs)
+            self._encoder = self._encoders[self._every]
+            self._encoder.begin(self, self._outputs)
 
-    def _complain(self, sentence: str) -> None:
+    def _warn(self, why: str) -> None:
         """Send the client a warning once per start; before, clients would mistake it for the answer to a recipe."""
-        if self.served and sentence not in self._said and len(self._said) < SENTENCES:
-            self._said.add(sentence)
-            self._send(text_message(self._version, TextLevel.WARNING, sentence, "RTDE"))
+        if self.served and why not in self._warned and len(self._warned) < MAX_WARNINGS:
+            self._warned.add(why)
+            self._send(warning(self._version, why))
 
 
 def ticks_between(frequency: float) -> int:

@@ -1,7 +1,7 @@
 """`python -m tvist_server.gateways.ur.rtde.table`: prints docs/reference/generated/rtde-variables.md."""
 
 from tvist_controller.instruments.variables import VARIABLES
-from tvist_server.gateways.ur.rtde.inputs import NAMED as NAMED_INPUTS
+from tvist_server.gateways.ur.rtde.variables import NAMED as NAMED_INPUTS
 from tvist_server.rtde.wire import WireType
 
 HEAD = """\

@@ -1,6 +1,7 @@
 """Turns the input variables of data packages into commands, omitting values that are already in force."""
 
 from collections.abc import Awaitable, Callable, Hashable, Iterable, Iterator
+from itertools import groupby
 from math import isclose
 from typing import Any
 
@@ -12,8 +13,8 @@ from tvist_protocol.replies import Refused, Reply
 from tvist_server.gateways.ur.deferred import begin
 from tvist_server.gateways.ur.lease import ConnectionControl, MakeCommand
 from tvist_server.gateways.ur.robot import UrRobot
-from tvist_server.gateways.ur.rtde.inputs import DIGITAL, REGISTERS
 from tvist_server.gateways.ur.rtde.recipes import Value
+from tvist_server.gateways.ur.rtde.variables import DIGITAL, REGISTERS
 from tvist_server.rtde.wire import WireType
 
 Number = bool | int | float
@@ -23,10 +24,10 @@ LARGEST = 1e308  # largest absolute value of an input; infinity and NaN are refu
 class InputWriter:
     """Sets the inputs of one connection; missing ones keep their last value, and a mask is 0 before its first."""
 
-    def __init__(self, robot: UrRobot, control: ConnectionControl, complain: Callable[[str], None]) -> None:
+    def __init__(self, robot: UrRobot, control: ConnectionControl, warn: Callable[[str], None]) -> None:
         self._robot = robot
         self._control = control
-        self._complain = complain
+        self._warn = warn
         self._pending = robot.inputs.pending
         self._held: dict[str, Value] = {}
 
@@ -35,7 +36,7 @@ class InputWriter:
         for name, value in values.items():
             numbers = value if isinstance(value, tuple) else (value,)
             if not all(abs(number) <= LARGEST for number in numbers):
-                self._complain(f"{name} is {value}: must be a number within ±{LARGEST:g}")
+                self._warn(f"{name} is {value}: must be a number within ±{LARGEST:g}")
                 values = {other: kept for other, kept in values.items() if other != name}
         self._held |= values
         registers = {name: value for name, value in values.items() if name in REGISTERS}
@@ -165,12 +166,12 @@ class InputWriter:
         value = self._number(name)
         if 0.0 <= value <= 1.0:
             return True
-        self._complain(f"{name} is {value:g}: must be between 0 and 1")
+        self._warn(f"{name} is {value:g}: must be between 0 and 1")
         return False
 
     def _change(self, values: dict[Hashable, object], command: MakeCommand) -> None:
         if self._control.held_by_other:
-            self._complain(
+            self._warn(
                 "another client has control: speed and outputs stay as they are, and forces are not read"
             )
             return
@@ -181,7 +182,7 @@ class InputWriter:
         answer = await reply
         self._pending.answered(values)
         if isinstance(answer, Refused):
-            self._complain(answer.why)
+            self._warn(answer.why)
 
 
 def _present(io: Io, name: str) -> Number:
@@ -194,19 +195,7 @@ def _present(io: Io, name: str) -> Number:
 
 def _runs(cells: dict[int, tuple[Number, bool]]) -> Iterator[tuple[int, tuple[Number, ...]]]:
     """Group registers with consecutive numbers; each group spans its first to its last new value."""
-    run: list[Number] = []
-    first = end = 0
-    for number in [*sorted(cells), None]:
-        if run and (number is None or number != first + len(run)):
-            yield first, tuple(run[:end])
-            run = []
-        if number is None:
-            return
-        value, new = cells[number]
-        if not run and not new:
-            continue
-        if not run:
-            first = number
-        run.append(value)
+    for _, group in groupby(enumerate(sorted(cells)), lambda pair: pair[1] - pair[0]):
+        new = [number for _, number in group if cells[number][1]]
         if new:
-            end = len(run)
+            yield new[0], tuple(cells[number][0] for number in range(new[0], new[-1] + 1))

@@ -1,4 +1,4 @@
-"""Who gets a place at the interfaces: those who say nothing keep nobody out, and some places are kept."""
+"""The limit of connections: silent clients are displaced, and some connections are reserved."""
 
 import asyncio
 import struct
@@ -13,13 +13,10 @@ from tvist_server.gateways.ur.connection import (
     MAX_CONNECTIONS,
     UNREAD_FOR,
     ConnectionLimit,
-    _is_loopback,
 )
 
-from .desks import PATIENCE, connect, lines, until
-
-VERSION_2 = struct.pack(">HBH", 5, ord("V"), 2)
-START, PAUSE = (struct.pack(">HB", 3, ord(letter)) for letter in "SP")
+from . import rtde_client
+from .desks import PATIENCE, connect, connect_and_greet, lines, until
 
 
 async def is_cut_off(reader):
@@ -42,16 +39,14 @@ async def package(reader):
 async def rtde(desk):
     """A client of RTDE that is being served."""
     reader, writer = await connect(desk, "rtde")
-    recipe = struct.pack(">HBd", 11 + len("timestamp"), ord("O"), 500.0) + b"timestamp"
-    writer.write(VERSION_2 + recipe + START)
+    writer.write(rtde_client.version() + rtde_client.outputs(["timestamp"]) + rtde_client.package("S"))
     assert [await package(reader) for _ in range(3)] == [b"V", b"O", b"S"]
     return reader, writer
 
 
 async def dashboard(desk):
     """A client of the dashboard that has said something."""
-    reader, writer = await connect(desk, "dashboard")
-    assert (await reader.readline()).startswith(b"Connected")
+    reader, writer = await connect_and_greet(desk)
     assert await lines(reader, writer, "robotmode") == ["Robotmode: RUNNING"]
     return reader, writer
 
@@ -64,19 +59,7 @@ async def readers(desk, count):
     return found
 
 
-async def test_clients_that_say_nothing_lock_nobody_out(desk):
-    for number in range(MAX_CONNECTIONS):
-        await connect(desk, ("dashboard", "rtde")[number % 2])
-    await until(lambda: all(connection.session for connection in desk.interfaces._connections))
-    await dashboard(desk)
-    await rtde(desk)
-    reader, _ = await connect(desk, "primary")
-    assert len(await asyncio.wait_for(reader.readexactly(5), PATIENCE)) == 5
-
-
-async def test_a_client_of_rtde_that_does_not_read_is_disconnected_after_ten_seconds_and_no_other(
-    later, desk, caplog
-):
+async def test_an_rtde_client_that_does_not_read_is_disconnected_after_10_s(later, desk, caplog):
     reading, (_, sleeping) = (await rtde(desk))[0], await rtde(desk)
     port = sleeping.get_extra_info("sockname")[1]
     (stuck,) = [one for one in desk.interfaces._connections if f":{port} " in one.peer]
@@ -94,7 +77,7 @@ async def test_a_client_of_rtde_that_does_not_read_is_disconnected_after_ten_sec
     assert [await package(reading) for _ in range(5)] == [b"U"] * 5
 
 
-async def test_for_a_newcomer_the_one_that_has_been_silent_for_longest_goes(later, desk, caplog):
+async def test_a_new_client_displaces_the_one_silent_for_longest(later, desk, caplog):
     old, _ = await dashboard(desk)
     served, _ = await rtde(desk)
     later(60.0)
@@ -109,7 +92,7 @@ async def test_for_a_newcomer_the_one_that_has_been_silent_for_longest_goes(late
     assert await lines(recent, writer, "robotmode") == ["Robotmode: RUNNING"]
 
 
-async def test_who_is_being_served_goes_for_nobody_and_the_last_newcomer_is_turned_away(later, desk, caplog):
+async def test_served_clients_are_never_displaced(later, desk, caplog):
     served, writer = await rtde(desk)
     later(86_400.0)
     others = await readers(desk, MAX_CONNECTIONS - 1)
@@ -117,7 +100,7 @@ async def test_who_is_being_served_goes_for_nobody_and_the_last_newcomer_is_turn
     assert "was refused: 256 of 256 connections are in use" in caplog.text
     await desk.tick()
     assert await package(served) == b"U"
-    writer.write(PAUSE)
+    writer.write(rtde_client.package("P"))
     assert await package(served) == b"P"
     reader, _ = await connect(desk, "primary")
     assert len(await reader.readexactly(5)) == 5
@@ -145,7 +128,7 @@ def places(*clients):
     return made, said
 
 
-def test_some_places_are_kept_for_this_machine():
+def test_some_connections_are_reserved_for_this_machine():
     house, said = places(*(Client() for _ in range(MAX_CONNECTIONS - LOCAL_PLACES)))
     assert not house.make_room("far", local=False)
     assert "8 are kept for this machine" in said[0]
@@ -157,7 +140,7 @@ def test_some_places_are_kept_for_this_machine():
 
 @examples(20)
 @given(st.lists(st.tuples(st.floats(0, 100), st.booleans()), min_size=200, max_size=MAX_CONNECTIONS))
-def test_whoever_goes_is_dispensable_and_nobody_such_has_been_silent_for_longer(clients):
+def test_only_the_longest_silent_dispensable_client_is_displaced(clients):
     all_of_them = [Client(*client) for client in clients]
     house, said = places(*all_of_them)
     came_in = house.make_room("new", local=True)
@@ -171,8 +154,3 @@ def test_whoever_goes_is_dispensable_and_nobody_such_has_been_silent_for_longer(
         assert one not in house.taken
     assert came_in == (len(house.taken) < MAX_CONNECTIONS)
     assert len(said) == len(gone) + (not came_in)
-
-
-def test_who_is_on_this_machine():
-    assert all(map(_is_loopback, ("127.0.0.1", "127.20.3.4", "::1", "::ffff:127.0.0.1")))
-    assert not any(map(_is_loopback, ("10.0.0.2", "fe80::1%eth0", "::ffff:10.0.0.2")))

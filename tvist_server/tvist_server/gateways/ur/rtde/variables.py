@@ -1,9 +1,13 @@
-"""Registers and the input variables that clients set: names and types."""
+"""Names and types of input variables, which clients set, outputs, which they read, and registers."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
 from fnmatch import fnmatchcase
-from typing import get_args
+from operator import attrgetter
+from typing import Any, NamedTuple, get_args
 
+from tvist_controller.instruments.snapshot import Snapshot
+from tvist_controller.instruments.variables import VARIABLES
+from tvist_controller.instruments.wrench import JOINT_LISTS
 from tvist_protocol.io import Bank
 from tvist_server.option_values import StartError
 from tvist_server.rtde.wire import WireType
@@ -33,31 +37,22 @@ NAMED: dict[str, tuple[WireType, str]] = {
     "speed_slider_fraction": (WireType.DOUBLE, "Position of the speed slider, 0 to 1."),
     "standard_digital_output_mask": (WireType.UINT8, "Mask of the eight standard digital outputs to set."),
     "standard_digital_output": (WireType.UINT8, "Values of the standard digital outputs."),
-    "configurable_digital_output_mask": (
-        WireType.UINT8,
-        "Mask of the eight configurable digital outputs to set.",
-    ),
+    "configurable_digital_output_mask":
+        (WireType.UINT8, "Mask of the eight configurable digital outputs to set."),
     "configurable_digital_output": (WireType.UINT8, "Values of the configurable digital outputs."),
     "tool_digital_output_mask": (WireType.UINT8, "Mask of the tool's two digital outputs to set."),
     "tool_digital_output": (WireType.UINT8, "Values of the tool's digital outputs."),
     "standard_analog_output_mask": (WireType.UINT8, "Mask of the two analogue outputs to set."),
-    "standard_analog_output_type": (
-        WireType.UINT8,
-        "Type of each analogue output: 0 is current (4–20 mA), 1 voltage (0–10 V).",
-    ),
-    "standard_analog_output_0": (
-        WireType.DOUBLE,
-        "Value of analogue output 0 as a share of its range, 0 to 1.",
-    ),
-    "standard_analog_output_1": (
-        WireType.DOUBLE,
-        "Value of analogue output 1 as a share of its range, 0 to 1.",
-    ),
-    "external_force_torque": (
-        WireType.VECTOR6D,
-        "Wrench measured by an external force sensor, every 100 ms; for programs of its host that use it [N, N m].",
-    ),
-}
+    "standard_analog_output_type":
+        (WireType.UINT8, "Type of each analogue output: 0 is current (4–20 mA), 1 voltage (0–10 V)."),
+    "standard_analog_output_0":
+        (WireType.DOUBLE, "Value of analogue output 0 as a share of its range, 0 to 1."),
+    "standard_analog_output_1":
+        (WireType.DOUBLE, "Value of analogue output 1 as a share of its range, 0 to 1."),
+    "external_force_torque":
+        (WireType.VECTOR6D,
+         "Wrench measured by an external force sensor, every 100 ms; for programs of its host that use it [N, N m]."),
+}  # fmt: skip
 """Type and description of each input variable that is not a register."""
 
 _BITS, _INTS, _DOUBLES = get_args(Bank)[:3]
@@ -86,3 +81,56 @@ def matching(patterns: Iterable[str]) -> list[str]:
         why = "must be the name of an RTDE input, such as speed_slider_mask or input_int_register_*"
         raise StartError(f"reserve_inputs has {wrong[0]!r}: {why}")
     return [name for names in found.values() for name in names]
+
+
+OUTPUTS: dict[str, WireType] = {name: WireType[one.type] for name, one in VARIABLES.items()} | {
+    name: wire for kind in KINDS for name, wire in registers(kind)
+}
+"""Type of every output variable by name."""
+
+
+class OutputSource(NamedTuple):
+    """One variable, or several with the same number of entries that are read together."""
+
+    read: Callable[[Snapshot], Any]
+    """Returns a number, a list of numbers, or doubles as bytes in the machine's order."""
+    letter: str  # format of an entry in `struct`
+    variables: int = 1  # number of variables
+    of_io: bool = False  # whether its values depend only on terminals and registers, which rarely change
+
+
+def _single_bits(bank: str) -> Callable[[Snapshot], list[bool]]:
+    """Return a function that returns the bits of a bank that are separate variables."""
+
+    def read(snapshot: Snapshot) -> list[bool]:
+        words: list[int] = getattr(snapshot.io, bank)
+        return [bool(words[number // 32] >> number % 32 & 1) for number in SINGLE_BITS]
+
+    return read
+
+
+def _parts() -> Iterator[tuple[str, tuple[OutputSource, int]]]:
+    for name, one in VARIABLES.items():
+        # Computed values may have other readers: the snapshot caches them.
+        read = attrgetter(name) if one.source == "computed" else one.read
+        yield name, (OutputSource(read, WireType[one.type].value[-1], of_io=one.source == "io"), 0)
+    joints = OutputSource(attrgetter("joint_lists"), "d", len(JOINT_LISTS))
+    yield from ((name, (joints, row)) for row, name in enumerate(JOINT_LISTS))
+    tool = OutputSource(lambda snapshot: snapshot.target.tobytes(), "d", 3)
+    yield from (
+        (f"target_TCP_{name}", (tool, row)) for row, name in enumerate(("pose", "speed", "acceleration"))
+    )
+    for kind in KINDS:
+        bank, bits = f"{kind}_register", kind.endswith("_bit")
+        words = [name for name, wire in registers(kind) if wire is not WireType.BOOL]
+        whole = OutputSource(
+            attrgetter(f"io.{bank}"), OUTPUTS[words[0]].value, 4 if bits else len(words), of_io=True
+        )
+        yield from ((name, (whole, row)) for row, name in enumerate(words))
+        if bits:
+            single = OutputSource(_single_bits(bank), WireType.BOOL.value, len(SINGLE_BITS), of_io=True)
+            yield from ((f"{bank}_{number}", (single, row)) for row, number in enumerate(SINGLE_BITS))
+
+
+PARTS: dict[str, tuple[OutputSource, int]] = dict(_parts())
+"""OutputSource with which each output variable is read, and its index in that part."""

@@ -38,33 +38,34 @@ LIMITS: Mapping[str, Any] = {
 """Zenoh settings, by path, of a session that other machines can reach."""
 
 
-def guarded(
+def server_security(
     listen: Sequence[str], robots: Sequence[str], *, security: str | None, insecure: bool, namespace: str = ""
 ) -> tuple[list[str], dict[str, Any]]:
     """Return the endpoints to listen on and the settings that protect them; StartError if one is unprotected."""
-    secured, settings, roles = _protected(listen, security, insecure=insecure)
+    secured, settings, roles = _security(listen, security, insecure=insecure)
     access = open_access(robots, namespace) if roles is None else access_control(robots, roles, namespace)
     return secured, {**settings, "access_control": access}
 
 
-def guarded_router(
+def router_security(
     listen: Sequence[str], *, security: str | None, insecure: bool
 ) -> tuple[list[str], dict[str, Any]]:
     """Return the same for a router; without certificates, anyone may connect as a robot or a client."""
-    secured, settings, roles = _protected(listen, security, insecure=insecure)
+    secured, settings, roles = _security(listen, security, insecure=insecure)
     return secured, settings if roles is None else {**settings, "access_control": router_access(roles)}
 
 
 def check_endpoints(what: str, endpoints: Sequence[str]) -> None:
     """Raise StartError if an endpoint is malformed."""
     for endpoint in endpoints:
-        if not is_endpoint(endpoint):
+        word, slash, address = endpoint.partition("/")
+        if not (slash and address and word.replace("-", "").isalnum()):
             raise StartError(
                 f"{what} is {endpoint!r}: must have the form tcp/ADDRESS:PORT, such as tcp/127.0.0.1:7447"
             )
 
 
-def _protected(
+def _security(
     listen: Sequence[str], security: str | None, *, insecure: bool
 ) -> tuple[list[str], dict[str, Any], dict[str, Role] | None]:
     """Return endpoints, transport settings, and the roles by name if there are certificates."""
@@ -72,7 +73,7 @@ def _protected(
     if security is not None:
         if insecure:
             raise StartError("security and insecure exclude each other: leave one out")
-        secured, folder = [_secured(endpoint) for endpoint in listen], Path(security).absolute()
+        secured, folder = [_tls_endpoint(endpoint) for endpoint in listen], Path(security).absolute()
         roles = roles_in(folder)
         if not roles:
             raise StartError(
@@ -105,7 +106,7 @@ def _protected(
     return list(listen), dict(LIMITS) if exposed else {}, None
 
 
-def guarded_interfaces(address: str, *, insecure: bool) -> None:
+def check_ur_address(address: str, *, insecure: bool) -> None:
     """Raise StartError if other machines could reach UR's interfaces, which cannot authenticate clients."""
     if not insecure and not ipaddress.ip_address(address).is_loopback:
         raise StartError(
@@ -124,7 +125,7 @@ def roles_in(folder: Path) -> dict[str, Role]:
         raise StartError(f"{error}; {hint}") from error
 
 
-def _secured(endpoint: str) -> str:
+def _tls_endpoint(endpoint: str) -> str:
     """Check an endpoint for use with `--security`; clients of another protocol would not expect TLS."""
     if protocol(endpoint) != "tls":
         address = endpoint.partition("/")[2] or "<address>:<port>"
@@ -171,12 +172,6 @@ def protocol(endpoint: str) -> str:
     """Return the protocol, such as `tcp` of `tcp/127.0.0.1:7447`; empty if there is none."""
     before, slash, _ = endpoint.partition("/")
     return before if slash else ""
-
-
-def is_endpoint(endpoint: str) -> bool:
-    """Return whether a text has the form of an endpoint: a word, a slash and an address."""
-    word, slash, address = endpoint.partition("/")
-    return bool(slash and address) and word.replace("-", "").isalnum()
 
 
 def options(endpoint: str) -> str:
