@@ -321,7 +321,7 @@ def told_and_false(rounds, seed):
 
 
 @pytest.mark.parametrize(
-    "rounds", [5, pytest.param(100, marks=[pytest.mark.nightly, pytest.mark.timeout(1200)])]
+    "rounds", [5, pytest.param(50, marks=[pytest.mark.nightly, pytest.mark.timeout(1200)])]
 )
 def test_a_wrong_payload_causes_a_warning_within_three_moves_a_right_one_never(rounds):
     missed, false, worst = told_and_false(rounds, seed=1)
