@@ -29,9 +29,9 @@ def _names(kind: str) -> Iterable[str]:
 
             found = BUILT_IN.names()
         case "compared":
-            from tvist_lab.study.menus import rows
+            from tvist_lab.study.method_list import methods_in
 
-            found = [row.name for row in rows()]
+            found = [one.name for one in methods_in()]
         case "plant":
             from tvist_controller.sources.own_plants import named_plants
 

@@ -241,7 +241,7 @@ def test_a_segment_that_was_moved_is_completed_where_it_is_and_the_next_one_take
 
 def test_replay_says_that_the_beginning_is_forgotten(path):
     record(path, 350)
-    with pytest.raises(ReplayError, match="has forgotten all before tick 226, so its run cannot be repeated"):
+    with pytest.raises(ReplayError, match="starts at tick 226, and only one from tick 0 can be replayed"):
         replay_file(read(path))
 
 
