@@ -104,7 +104,7 @@ def test_friction_without_free_path_is_not_measured():
         async with robot_in_process(free_setup()) as robot, robot.control("test") as control:
             await identify_friction(robot, control, ROBOT, [np.zeros(6)])
 
-    with pytest.raises(IdentificationError, match="no room"):
+    with pytest.raises(IdentificationError, match="no path of"):
         asyncio.run(run())
 
 
