@@ -31,15 +31,15 @@ def identified(called):
 
 def test_identify_writes_a_calibration(identified, tmp_path):
     path = tmp_path / "mine.json"
-    said = identified("--ring-downs", 5, "--output", path)
+    said = identified("--ring-downs", 4, "--output", path)
     assert said.keys() >= KEYS
-    assert said["ring_downs"] == 5
+    assert said["ring_downs"] == 4
     assert said["payloads_kg"] == [0.0, 5.0]
     assert said["error_f_d_percent"] < 6.0
     calibration = calibration_from_json(path.read_bytes())
     assert calibration.name == "mine"
     assert [mode["measured_at_m_s2"] > 0.1 for mode in said["modes"]] == [True] * 3
-    assert calibration.provenance.command.startswith("tvist identify --ring-downs 5 --output")
+    assert calibration.provenance.command.startswith("tvist identify --ring-downs 4 --output")
     assert calibration.provenance.arm == fingerprint(load("ur5e"))
 
 
