@@ -18,8 +18,7 @@ LEAST_TRUTH_SHARE = 0.8
 
 def judge(without: "MotionRecord", shaped: "MotionRecord") -> "Verdict":
     """Measure one motion without and with a shaper, each with the rest after it; missing values are None."""
-    from tvist_lab.change import MotionChange
-    from tvist_lab.metrics.comparison import compare
+    from tvist_lab.metrics.comparison import MotionChange, compare
     from tvist_lab.metrics.table import MeasuredRecording
 
     first, second = (MeasuredRecording.of(_recording(run)) for run in (without, shaped))

@@ -25,9 +25,9 @@ def _offered(names: str | Callable[[], Iterable[str]], *endings: str) -> Paramet
 
 
 def _compared() -> list[str]:
-    from tvist_lab.study.menus import rows
+    from tvist_lab.study.method_list import methods_in
 
-    return [row.name for row in rows()]
+    return [method.name for method in methods_in()]
 
 
 def _poses() -> list[str]:

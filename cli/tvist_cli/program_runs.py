@@ -13,12 +13,12 @@ from tvist_cli.failure import Failure, Misuse, failing_on, interrupted
 from tvist_cli.output import err, print_json, say
 from tvist_cli.serving import introduction, say_recorded, say_who_can_reach
 from tvist_controller.programs.compiling import ProgramFinding, check_program
+from tvist_lab.phrases import counted
 from tvist_lab.programs.judging import Run, broken, changes, missed
 from tvist_lab.programs.limits import RunLimits
 from tvist_lab.programs.results import Shortcoming, as_dict, summary
 from tvist_lab.programs.running import InputError, ProgramServer, run_in_lockstep
 from tvist_lab.programs.watch import ProgramMessage, ProgramWatch
-from tvist_lab.words import counted
 from tvist_plant.user_file import LARGEST, UserFileError
 from tvist_protocol.errors import harmless
 from tvist_server.config import ServeConfig

@@ -25,8 +25,8 @@ from tvist_lab.study.case import LIMITS
 from tvist_lab.study.catalogue import baselines, some
 from tvist_lab.study.foreign import CandidateError, FromFile, load_shaper
 from tvist_lab.study.held_out import said
-from tvist_lab.study.menus import UNSHAPED, names
 from tvist_lab.study.method import Method, Named
+from tvist_lab.study.method_list import UNSHAPED, names
 from tvist_lab.study.moves import STROKE, Move, MovesError, collisions, draw_moves, read_moves, write_moves
 from tvist_lab.study.recipes import Recipe, RecipeError
 from tvist_lab.study.request import Preset, StudyRequest
@@ -47,7 +47,7 @@ def preset_study(name: str, options: StudyOptions) -> Study:
     preset = PRESETS[name]
     of_others = {one for other in PRESETS.values() for one in other.options} - preset.options
     for option in options.given:
-        if option in of_others or (option == "baselines" and preset.menu is None):
+        if option in of_others or (option == "baselines" and preset.defaults is None):
             raise Misuse(f"--{option.replace('_', '-')} is not for {name}: see tvist study --help")
     _check(options)
     with failing_on(StudyError, MovesError, DescriptionError, CandidateError, *OF_SHAPERS, exit_code=2):
@@ -109,10 +109,10 @@ def _asked(
     others: tuple[Method, ...] = ()
     if preset.always:
         always = some(preset.always, description, _calibration(given, "", 1, description, modal=True))
-    if preset.menu is not None and (options.baselines or options.shapers is None):
-        if preset.menu != "baselines":
+    if preset.defaults is not None and (options.baselines or options.shapers is None):
+        if preset.defaults != "baselines":
             known = _calibration(given, "", 1, description, modal=True)
-            others = some(names(preset.menu), description, known, masses)
+            others = some(names(preset.defaults), description, known, masses)
         elif calibrated := _calibrations(named):
             others = baselines(calibrated[0], description, masses, error)
     methods = {one.name: one for one in (*always, *named, *others)}

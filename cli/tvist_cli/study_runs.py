@@ -16,13 +16,13 @@ from tvist_cli.output import out, print_json, progress, say, table, typed, words
 from tvist_cli.study_asked import preset_study, swept
 from tvist_cli.study_options import StudyOptions
 from tvist_lab.figures import house_style
+from tvist_lab.phrases import counted
 from tvist_lab.report import study_figures, study_page
 from tvist_lab.runners import processes as some_processes
 from tvist_lab.study import engine
 from tvist_lab.study.columns import cells, meanings, titles
 from tvist_lab.study.study import Result, Study, StudyError, read_study
 from tvist_lab.study.work import FAILED, TOO_WEAK
-from tvist_lab.words import counted
 
 ADDRESS = re.compile(r"((tcp|tls|ws|wss)://)?([^\s:/\[\]]+|\[[\da-fA-F:.]+\]):\d{1,5}")
 """Address of a Dask scheduler."""

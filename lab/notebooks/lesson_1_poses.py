@@ -14,8 +14,8 @@ with app.setup:
     from tvist_lab.figures import house_settings
     from tvist_lab.figures.style import INK, SHAPED, UNSHAPED, legend, note, panels, title
     from tvist_lab.studies.paper.published import pose
-    from tvist_lab.study.menus import names
-    from tvist_lab.workspace import identified, ranges
+    from tvist_lab.study.method_list import names
+    from tvist_lab.workspace import identified
     from tvist_plant.description import load
     from tvist_shaping import residual, shaper
 
@@ -123,7 +123,7 @@ def _():
 
 @app.cell(hide_code=True)
 def _(estimator):
-    workspace = identified(ranges(load("ur5e"))).spread(250, 6, seed=0)
+    workspace = identified(load("ur5e")).spread(250, 6, seed=0)
     spread_f, spread_zeta = modes(estimator, workspace)
     return spread_f, spread_zeta
 

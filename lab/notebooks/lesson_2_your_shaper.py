@@ -16,8 +16,8 @@ with app.setup:
     from tvist_lab.figures import house_settings
     from tvist_lab.figures.style import INK, SHAPED, THIRD, UNSHAPED, legend, panels
     from tvist_lab.study.case import Case
-    from tvist_lab.study.menus import names
     from tvist_lab.study.method import Named
+    from tvist_lab.study.method_list import names
     from tvist_lab.study.moves import draw_moves
     from tvist_lab.study.recipes import Recipe
     from tvist_lab.study.work import Job, measure

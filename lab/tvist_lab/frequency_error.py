@@ -5,8 +5,7 @@ import numpy as np
 from tvist_lab.recordings import Floats
 from tvist_shaping import Shaper, residual, shaper
 
-ALLOWED = 0.05
-"""Residual vibration at which a mode counts as settled, and which a robust shaper may leave [-]."""
+ALLOWED = 0.05  # residual vibration at which a mode counts as settled [-]
 
 
 def residual_over_error(shaper: Shaper, zeta: float, errors: Floats) -> Floats:

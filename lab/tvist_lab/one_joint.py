@@ -25,11 +25,9 @@ from tvist_plant.plant import PERIOD
 from tvist_shaping import FlexibleJoint, flexible_joint
 
 MASSES = (0.0, 1.0)  # payloads of the figure [kg]
-ANGLES = tuple(np.radians(np.arange(0.0, 151.0, 10.0)).tolist())
-"""Elbow angles at which the arm is plucked [rad]."""
+ANGLES = tuple(np.radians(np.arange(0.0, 151.0, 10.0)).tolist())  # elbow angles [rad]
 TORQUE = 2.0  # torque that twists the shoulder before it is released [N m]
-HELD, LISTENED = 1.0, 1.0
-"""Time for which the torque acts, until the arm rests, and time recorded after its release [s]."""
+HELD, LISTENED = 1.0, 1.0  # time for which the torque acts, and recorded after it [s]
 GRAVITY = (0.0, 0.0, 9.81)  # reading of the accelerometer of an arm with vertical axes at rest [m/s²]
 
 

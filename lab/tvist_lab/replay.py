@@ -86,20 +86,18 @@ def replay_file(
     """
     if not content.start:  # empty in recordings made by another program
         raise ReplayError(
-            "the recording has no initial setup of its robot; only tvist serve --record writes it"
+            "the recording has no initial setup of its robot: record it with tvist serve --record"
         )
     if content.from_tick is not None:
         raise ReplayError(
-            f"the recording has forgotten all before tick {content.from_tick}, so its run cannot be repeated; "
-            "--publish puts its messages on the network"
+            f"the recording starts at tick {content.from_tick}, and only one from tick 0 can be replayed: "
+            "publish its messages with --publish"
         )
     if (content.dropped or {}).get("journal"):
-        raise ReplayError("the recorder dropped messages of the journal, so an equal run is not possible")
+        raise ReplayError("the recorder dropped messages of the journal, so the run cannot be repeated")
     last, there = int(content.recording["tick"][-1]), len(content.recording)
     if last > (most := ALWAYS + PER_STATE * there):
-        raise ReplayError(
-            f"the recording goes on to tick {last}, but of {there} states at most {most} are replayed"
-        )
+        raise ReplayError(f"the recording ends at tick {last}: must be at most {most} with {there} states")
     used, notes = _used(content.start, own_shapers)
     plant, said = _same_plant(content.start, plant)
     notes += said
@@ -162,8 +160,8 @@ def _same_plant(start: dict[str, Any], given: OwnPlant | None) -> tuple[OwnPlant
         return load_plant(recorded.place), []
     if recorded.place.lower().startswith("ur://"):
         raise ReplayError(
-            f"the robot was the one at {recorded.place}: what a real arm did is not determined by what the controller "
-            "received, so that it cannot be replayed. Next: tvist log replay --publish shows the recording"
+            f"the robot was the one at {recorded.place}: a real arm's motion does not follow from the controller's "
+            "inputs, so it cannot be replayed: view the recording with tvist log replay --publish"
         )
     if given is None:
         raise ReplayError(
@@ -198,10 +196,8 @@ def _tick(controller: Controller, setup: Setup, done: Replay) -> None:
     controller.programs.sockets.orders.clear()  # what became of them is in the journal
     done.states.append(state)
     done.events += events
-    if setup.truth:
-        truth = controller.truth()
-        if truth is not None:
-            done.truths.append(truth)
+    if setup.truth and (truth := controller.truth()) is not None:
+        done.truths.append(truth)
 
 
 def _give(controller: Controller, entry: Entry, presence: Presence) -> None:
@@ -231,11 +227,10 @@ def _give(controller: Controller, entry: Entry, presence: Presence) -> None:
 
 
 def _give_message(controller: Controller, entry: Entry, presence: Presence) -> None:
-    message = message_of(entry)
+    message, session = message_of(entry), entry.session
     if isinstance(message, Setpoint):
         controller.receive_setpoint(message)
         return
-    session = entry.session
     if session is None and isinstance(message, TakeControl | HandOver):
         session = presence.session_of(message.client)
     controller.receive(message, session=session)

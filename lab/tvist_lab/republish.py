@@ -26,8 +26,7 @@ REFUSAL = Refused(
     code="wrong_mode",
     where="",
     why="a recording is being played back, which takes no commands: it only publishes",
-)
-"""Answer to every command."""
+)  # answer to every command
 
 
 class PlaybackDesk(CommandIntake):
@@ -67,7 +66,9 @@ class Playback:
         insecure: bool = False,
     ) -> None:
         if content.info is None:
-            raise RecordingError(f"{content.path} does not describe its robot, so no client could read it")
+            raise RecordingError(
+                f"{content.path} does not describe its robot: record it with tvist serve --record"
+            )
         self.name = keys.check_robot_name(name or content.robot)
         self.states = 0
         self._content, self._speed, self._loop = content, speed, loop
@@ -99,13 +100,10 @@ class Playback:
                     self._desk.tick = message.tick
                 self._gateway.publish(topic_of(message), message, encode(message))
         finally:
-            self._close()
-
-    def _close(self) -> None:
-        """Close the network; a client that has stopped reading may delay that for ten seconds."""
-        leaving = Thread(target=self._leave, name="tvist-leave", daemon=True)
-        leaving.start()
-        leaving.join(LEAVE)
+            # In a thread, since a client that has stopped reading may delay this for ten seconds.
+            leaving = Thread(target=self._leave, name="tvist-leave", daemon=True)
+            leaving.start()
+            leaving.join(LEAVE)
 
     def _leave(self) -> None:
         with suppress(Exception):

@@ -69,7 +69,9 @@ def outcomes(
         while out:
             yield next_outcome()
     except BrokenExecutor:
-        raise ChildProcessError("a process died while it did a task; perhaps memory ran out") from None
+        raise ChildProcessError(
+            "a worker process ended during a task: free memory, or use fewer workers"
+        ) from None
     except CancelledError:
         raise ConnectionError("the executor has dropped its tasks; perhaps its scheduler has gone") from None
 

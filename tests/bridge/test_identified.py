@@ -14,7 +14,7 @@ from tvist_controller.api.robot import OwnPlant
 from tvist_lab.identification.calibrate import calibrate
 from tvist_lab.identification.jogs import make_jogs, plan_jogs
 from tvist_lab.in_process import free_setup, robot_in_process
-from tvist_lab.workspace import identified, ranges
+from tvist_lab.workspace import identified
 from tvist_plant.description import load
 from tvist_plant.variants import hidden_variant
 from tvist_server.moving.servo_lag import ServoLag, ServoSetpoints
@@ -71,7 +71,7 @@ def unseen(description, hidden, declared, seed):
     drives = description.drives
     stiff = with_fields(drives, gear_stiffness=tuple(stiffer * K for K in drives.gear_stiffness))
     arm: Any = hidden_variant(hidden).make(with_fields(description, drives=stiff), body(declared), 0)
-    places = identified(ranges(description)).random(PLACES, description.joints, seed + 1000)
+    places = identified(description).random(PLACES, description.joints, seed + 1000)
     found = [(q, arm.modes(q)) for q in places]
     return [(q, float(modes.f_d[0]), float(modes.zeta[0])) for q, modes in found]
 

@@ -17,26 +17,26 @@ UR = ("ur3e", "ur10e", "ur16e", "ur20", "ur30", "ur5e")
 
 
 @pytest.mark.parametrize("name", [*UR, "ur5-light", "ur5e_stiction"])
-def test_an_arm_has_a_calibration_of_its_own_springs(name):
+def test_calibration_of_an_arm_has_its_stiffness(name):
     arm = load(name)
     own = [one for one in map(load_calibration, available()) if one.robot == arm.robot.model and one.modal]
     assert [one.provenance.arm for one in own] == [fingerprint(arm)]
 
 
 @pytest.mark.parametrize("name", UR)
-def test_gears_sag_by_gravity_over_stiffness(name, measured):
+def test_gear_deflection_at_rest_is_gravity_torque_over_stiffness(name, measured):
     error = sag_error(load(name), seed=0)
     measured(f"{name}: sag off by [%]", error)
     assert error < 1.0
 
 
-def test_every_table_of_numbers_has_an_origin():
+def test_every_table_of_a_robot_file_has_a_provenance():
     for name in robots():
         told = {key.partition(".")[0] for kind in about(name, load(name))["origins"].values() for key in kind}
         assert {"kinematics", "links", "limits", "drives"} <= told, name
 
 
-def test_three_arms_are_stilled_by_auto_out_of_the_box():
+def test_auto_reduces_vibration_of_three_arms_without_settings():
     """By the command that the reference page names, with fewer moves."""
     command = ("robots", "ur3e", "ur10e", "ur20", "--measure", "--random", "4", "--json")
     ended = finished("-m", "tvist_cli", *command)

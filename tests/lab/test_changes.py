@@ -58,7 +58,7 @@ class ChangingArm:
         return Measurement(measured.q, measured.qd, moment, measured.accelerometer)
 
 
-def recorded(mass=0.0, springs=1.0, before=8, after=4):
+def recorded(mass=0.0, springs=1.0, before=8, after=2):
     """Random motions of a hidden robot without a shaper, of which the arm is another after the first ones."""
     random, declared, states = np.random.default_rng([4, 73]), paper_payload(UR5E, 1.7), []
     arm = ChangingArm(body(declared), seed=4)
@@ -91,21 +91,26 @@ def recorded(mass=0.0, springs=1.0, before=8, after=4):
     return MeasuredRecording(recording, found, [])
 
 
-def test_a_payload_that_was_picked_up_is_told_with_its_mass():
-    (mass,) = [one for one in changes(recorded(mass=2.0)) if "kg" in one]
+@pytest.fixture(scope="module")
+def picked_up():
+    return recorded(mass=2.0)
+
+
+def test_undeclared_payload_is_reported_with_its_mass(picked_up):
+    (mass,) = [one for one in changes(picked_up) if "kg" in one]
     number, more = re.match(r"After motion (\d+), the arm carries about ([\d.]+) kg more", mass).groups()
-    assert int(number) in (9, 10, 11)
+    assert int(number) in (9, 10)
     assert float(more) == pytest.approx(2.0, abs=0.6)
 
 
-def test_springs_that_have_become_softer_are_told():
-    said = [one for one in changes(recorded(springs=0.6)) if "the gear of the " in one]
+def test_softer_gears_are_reported():
+    said = [one for one in changes(recorded(springs=0.6, after=4)) if "the gear of the " in one]
     assert said
     assert all(int(re.match(r"After motion (\d+),", one)[1]) > 8 and "% softer" in one for one in said)
 
 
-def test_nothing_is_told_of_an_arm_that_stays_as_it_was():
-    assert changes(recorded(after=2)) == []
+def test_unchanged_arm_gives_no_report(picked_up):
+    assert changes(MeasuredRecording(picked_up.recording, picked_up.motions[:8], [])) == []
 
 
 def by_hand(f_d, poses):
@@ -121,7 +126,7 @@ def by_hand(f_d, poses):
     return changes(MeasuredRecording(recording, found, results))
 
 
-def test_in_a_foreign_log_only_stops_in_one_pose_are_compared_with_each_other():
+def test_stops_of_a_foreign_log_are_compared_in_equal_poses_only():
     f_d = np.where(np.arange(24) % 2, 12.0, 8.1)
     assert by_hand(f_d, np.arange(24) % 2) == []
     f_d[12::2] = 7.3
@@ -145,7 +150,7 @@ def told(values, errors=0.02):
 
 
 @pytest.mark.parametrize("tails", ["normal", "heavy"])
-def test_of_a_hundred_motions_without_a_change_at_most_one_is_told_of(tails):
+def test_false_alarms_are_at_most_one_in_a_hundred_motions(tails):
     random, alarms = np.random.default_rng(3), 0
     for _ in range(40):
         noise = 2.0 * random.normal(size=30) if tails == "normal" else random.standard_t(3, size=30)
@@ -154,7 +159,7 @@ def test_of_a_hundred_motions_without_a_change_at_most_one_is_told_of(tails):
 
 
 @pytest.mark.parametrize("shift", [-0.4, 0.4])
-def test_a_change_is_told_within_three_motions_with_its_size(shift):
+def test_change_is_detected_within_three_motions_with_its_size(shift):
     for seed in range(20):
         random = np.random.default_rng(seed)
         values = 0.7 + SCATTER * random.normal(size=13) + shift * (np.arange(13) >= 10)
@@ -163,7 +168,7 @@ def test_a_change_is_told_within_three_motions_with_its_size(shift):
         assert change.after - change.before == pytest.approx(shift, abs=4.0 * change.error)
 
 
-def test_an_outlier_an_uncertain_value_and_a_small_change_are_no_changes():
+def test_outlier_uncertain_value_and_small_change_are_ignored():
     values = SCATTER * np.random.default_rng(5).normal(size=30)
     values[15] = 20.0
     assert not told(values)
@@ -171,13 +176,13 @@ def test_an_outlier_an_uncertain_value_and_a_small_change_are_no_changes():
     assert not told(np.repeat([0.0, 0.09], 10), errors=1e-6)
 
 
-def test_a_change_back_is_told_as_well():
+def test_change_back_is_detected():
     values = np.repeat([0.0, 0.5, 0.0], 10)
     assert [round(change.after - change.before, 2) for _, change in told(values)] == [0.5, -0.5]
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_no_warning_of_a_change_names_an_interval_that_holds_none(seed):
+def test_interval_of_a_reported_change_excludes_zero(seed):
     random, said = np.random.default_rng([seed, 54]), []
     for arguments, tell in ((MASS, _of_mass), (GEAR, partial(_of_gear, joint="elbow")), (MODES, _of_modes)):
         for _ in range(25):

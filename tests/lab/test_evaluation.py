@@ -56,14 +56,14 @@ def but(joint, angle):
 
 
 class TestFiles:
-    def test_a_move_says_where_from_and_where_to_and_may_have_a_payload_of_its_own(self, written):
+    def test_move_has_start_and_target_and_optional_payload(self, written):
         first, second = written(
             [{"start": HOME, "target": but(0, 1.0), "payload": 0}, {"start": HOME, "target": but(1, 0.0)}]
         )
         assert first == Move(tuple(HOME), tuple(but(0, 1.0)), 0.0)
         assert second == Move(tuple(HOME), tuple(but(1, 0.0)), 5.0)
 
-    def test_what_is_written_is_read(self, tmp_path, ur5e):
+    def test_written_moves_are_read_back(self, tmp_path, ur5e):
         moves = draw_moves(ur5e, 5, 1, (0.0, 5.0)).moves
         write_moves(tmp_path / "moves.json", moves)
         assert read_moves(tmp_path / "moves.json", ur5e, lambda: math.nan) == moves
@@ -80,24 +80,24 @@ class TestFiles:
                 [{"start": HOME, "target": but(0, 1.0)}, {"start": HOME, "target": HOME}],
                 ["move 2", "too short"],
             ),
-            ([{"start": HOME, "target": HOME[:5]}], ["move 1", "target", "5 angles", "6 joints"]),
+            ([{"start": HOME, "target": HOME[:5]}], ["move 1", "target", "5 angles", "must be 6"]),
             ([{"start": HOME, "target": but(2, 9.0)}], ["move 1", "target", "joint 3", "elbow", "±6.28319"]),
             ([{"start": but(4, "x"), "target": HOME}], ["move 1", "start", "joint 5"]),
         ],
     )
-    def test_what_is_wrong_is_named(self, written, content, words):
+    def test_wrong_moves_are_refused(self, written, content, words):
         with pytest.raises(MovesError) as error:
             written(content)
         assert all(word in str(error.value) for word in words), error.value
 
 
 class TestDraws:
-    def test_a_seed_draws_the_same_moves_whatever_the_number(self, ur5e):
+    def test_seed_draws_the_same_moves_for_any_number(self, ur5e):
         few, many = draw_moves(ur5e, 5, 3, (0.0, 5.0)), draw_moves(ur5e, 20, 3, (0.0, 5.0))
         assert few.moves == many.moves[:5]
         assert few.moves != draw_moves(ur5e, 5, 4, (0.0, 5.0)).moves
 
-    def test_moves_are_those_of_the_workspace_and_free(self, ur5e):
+    def test_drawn_moves_are_in_the_workspace_and_free_of_collisions(self, ur5e):
         drawn = draw_moves(ur5e, 30, 7, (1.0, 4.0))
         collision = CollisionModel(ur5e, body(paper_payload(ur5e, 5.0)))
         for move in drawn.moves:
@@ -113,13 +113,13 @@ class TestDraws:
                 assert collision.meeting(start + share * (target - start)) is None
         assert 0.0 < drawn.share <= 1.0
 
-    def test_wrists_turn_where_they_may(self, ur5e):
+    def test_wrists_turn_only_if_permitted(self, ur5e):
         moves = draw_moves(ur5e, 20, 7, (0.0, 0.0), wrists=True).moves
         assert np.abs([move.target[4:] for move in moves]).max() > 1.5
 
 
 class TestLine:
-    def test_a_longer_double_S_takes_the_time_it_is_told(self, move):
+    def test_double_S_of_given_duration_takes_that_time(self, move):
         start, target = np.array(move.start), np.array(move.target)
         for ticks in (len(point_to_point(start, target)) + extra for extra in (0, 7, 40, 150)):
             longer = lengthened(start, target, ticks)
@@ -127,20 +127,20 @@ class TestLine:
             np.testing.assert_array_equal(longer[-1], target)
             assert np.abs(np.diff(longer, 2, axis=0)).max() <= (1.0 + 1e-9) * PAPER.acceleration * PERIOD**2
 
-    def test_a_reference_that_is_not_followed_to_the_end_is_said_not_to_end(self):
+    def test_output_that_never_reaches_the_target_is_reported(self):
         short = SimpleNamespace(delay=0.0, step=lambda q: 0.999 * q)
         assert not shape(short, point_to_point(np.zeros(2), np.ones(2)), watched=False).ended
 
 
 class TestRecipes:
-    def test_a_wrong_frequency_is_wrong_by_the_share(self):
+    def test_frequency_error_scales_the_frequencies(self):
         wrong = FrequencyError(Fixed([10.0, 20.0], [0.1, 0.2]), -0.2)
         f_d, zeta = wrong.estimate(np.zeros(6))
         np.testing.assert_allclose(f_d, [8.0, 16.0])
         np.testing.assert_allclose(zeta, [0.1, 0.2])
         assert (wrong.modes, wrong.f_d_min, wrong.zeta_max) == (2, 8.0, 0.2)
 
-    def test_several_modes_without_a_modal_calibration_and_an_unknown_shaper_are_refused(self, ur5e, paper):
+    def test_several_modes_of_a_polynomial_and_an_unknown_shaper_are_refused(self, ur5e, paper):
         with pytest.raises(RecipeError, match="tvist identify"):
             Recipe("zv", paper, modes=3).make(ur5e, 5.0)
         with pytest.raises(RefusalError, match="zz"):
@@ -170,7 +170,7 @@ def report(ur5e, paper):
 
 
 class TestReport:
-    def test_percentages_leave_out_what_did_not_vibrate_and_say_so(self, report):
+    def test_percentages_omit_moves_without_vibration_with_a_note(self, report):
         result = report((1.0, 0.1), (2.0, 0.5), (0.5 * WORTH, 0.1 * WORTH))
         told = result.values["summary"][0]
         moves = result.study.tables_of(result)[0].entries
@@ -183,19 +183,19 @@ class TestReport:
         assert peaks == pytest.approx([0.3, 0.48])
         assert any("1 of 3 moves have an unshaped peak below 0.2" in note for note in result.values["notes"])
 
-    def test_nothing_but_moves_without_vibration_is_no_percentage(self, report):
+    def test_moves_without_vibration_give_no_percentage(self, report):
         values = report((0.1, 0.05)).values
         assert values["summary"][0]["reduction_percent_median"] is None
         assert values["verdict"] == ["No move vibrates enough unshaped to show what zv does."]
 
-    def test_an_interval_covers_the_percentile_of_a_known_distribution(self):
+    def test_interval_contains_the_percentile_of_a_known_distribution(self):
         random = np.random.default_rng(5)
         drawn = [interval(random.standard_normal(200), 50) for _ in range(60)]
         assert np.mean([low <= 0.0 <= high for low, high in drawn]) >= 0.85
 
 
 class TestMoves:
-    def test_the_papers_motion_is_what_the_paper_page_says(self, ur5e, paper, move):
+    def test_results_of_the_papers_motion_equal_the_published_ones(self, ur5e, paper, move):
         methods = (*some(["zv"], ur5e, paper), *baselines(paper, ur5e, (5.0, 5.0)))
         (job,) = study(StudyRequest(description=ur5e, moves=[move], methods=methods, named=1)).jobs()
         shaped, waiting, longer, *others = measure(job)

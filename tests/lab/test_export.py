@@ -45,7 +45,7 @@ def recording(rows=40):
 
 @pytest.mark.parametrize("kind", FORMATS)
 class TestRoundTrip:
-    def test_every_bit_comes_back_in_its_shape(self, kind, tmp_path):
+    def test_values_and_shapes_survive_export(self, kind, tmp_path):
         path, expected = tmp_path / f"run.{kind}", recording()
         export(expected, path, kind)
         found = read(path)
@@ -55,14 +55,14 @@ class TestRoundTrip:
         assert (found.events, found.info) == (expected.events, expected.info)
         assert (found.notes, found.foreign) == (expected.notes, expected.foreign)
 
-    def test_a_log_of_another_controller_comes_back(self, kind, tmp_path):
+    def test_foreign_log_survives_export(self, kind, tmp_path):
         expected = read(SyntheticLog(motions=1, rate=100.0).csv(tmp_path / "log.csv"))
         assert expected.foreign
         export(expected, path := tmp_path / f"run.{kind}", kind)
         found = read(path)
         assert all(np.array_equal(found[name], expected[name], equal_nan=True) for name in expected.columns)
 
-    def test_on_a_full_disk_it_says_so_and_the_old_file_stays(self, kind, tmp_path):
+    def test_full_disk_is_reported_and_keeps_the_old_file(self, kind, tmp_path):
         path = tmp_path / f"run.{kind}"
         path.write_bytes(b"old")
         before = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -76,7 +76,7 @@ class TestRoundTrip:
         assert [place.name for place in tmp_path.iterdir()] == [path.name]
 
 
-def test_a_parquet_cut_short_is_refused_by_its_name(tmp_path):  # a CSV cut short is a shorter CSV
+def test_truncated_parquet_is_refused(tmp_path):  # a CSV cut short is a shorter CSV
     path = tmp_path / "run.parquet"
     export(recording(), path, "parquet")
     whole = path.read_bytes()
@@ -87,7 +87,7 @@ def test_a_parquet_cut_short_is_refused_by_its_name(tmp_path):  # a CSV cut shor
 
 
 class TestLayout:
-    def test_a_csv_has_one_column_for_each_entry_empty_cells_and_units_beside_it(self, tmp_path):
+    def test_csv_has_a_column_per_entry_empty_cells_and_a_file_of_units(self, tmp_path):
         export(recording(), tmp_path / "run.csv", "csv")
         with (tmp_path / "run.csv").open(newline="") as file:
             header, first, *_ = csv.reader(file)
@@ -103,14 +103,14 @@ class TestLayout:
         assert columns["actual_TCP_pose_3"]["schema:unitText"] == "rad"
         assert columns["tick"]["datatype"] == "integer"
 
-    def test_parquet_has_types_and_the_description_in_its_metadata(self, tmp_path):
+    def test_parquet_has_types_and_a_description_in_its_metadata(self, tmp_path):
         export(recording(), path := tmp_path / "run.parquet", "parquet")
         assert json.loads(pl.read_parquet_metadata(path)[KEY])["info"]["name"] == INFO.name
         table = pl.read_parquet(path)
         assert table.columns[0] == "timestamp"
         assert (table["tick"].dtype, table["actual_q_5"].dtype) == (pl.Int64, pl.Float64)
 
-    def test_tables_without_our_description_are_read_as_logs(self, tmp_path):
+    def test_tables_without_our_description_are_read_as_foreign_logs(self, tmp_path):
         q = 0.01 * np.cumsum(np.random.default_rng(0).standard_normal((500, 6)), axis=0)
         time = np.arange(500) * 0.002
         np.savez(tmp_path / "own.npz", timestamp=time, actual_q=q)
@@ -139,7 +139,7 @@ class TestCommands:
         record(path, [*messages, Event(tick=5, kind="warning")])
         return path
 
-    def test_export_names_the_file_after_the_recording_and_replaces_only_a_named_one(self, path, capsys):
+    def test_export_replaces_only_a_file_that_was_named(self, path, capsys):
         export_command(path, to="CSV", json=True)
         written = json.loads(capsys.readouterr().out)["written"]
         assert written == [str(path.with_name(name)) for name in ("run.csv", "run.csv-metadata.json")]
@@ -152,7 +152,7 @@ class TestCommands:
             export_command(path, to="xls")
 
     @pytest.mark.parametrize("kind", [None, "csv"])
-    def test_analyze_tells_what_every_kind_of_file_holds(self, kind, path, capsys):
+    def test_analyze_lists_the_content_of_every_kind_of_file(self, kind, path, capsys):
         if kind is not None:
             export(read(path), path.with_suffix(f".{kind}"), kind)
             path = path.with_suffix(f".{kind}")
@@ -170,7 +170,7 @@ class TestCommands:
         assert "actual_TCP_pose 6 [m, rad]" in " ".join(said.split())
         assert "It contains no motion." in said
 
-    def test_analyze_says_that_a_file_was_cut_off(self, path, capsys):
+    def test_analyze_reports_a_truncated_file(self, path, capsys):
         path.write_bytes(path.read_bytes()[:-20])
         analyze(path)
         out, err = capsys.readouterr()

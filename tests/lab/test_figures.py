@@ -120,7 +120,7 @@ def sheet(tmp_path):
 
 
 @pytest.mark.parametrize("name", MAKERS)
-def test_axes_have_units_and_text_is_large_enough_and_within_the_figure(figures, make, sheet, name):
+def test_axes_have_units_and_readable_text_within_the_figure(figures, make, sheet, name):
     with figures.house_style(sheet(NARROW)):
         figure = make(name)
         figure.draw_without_rendering()
@@ -142,9 +142,7 @@ def test_axes_have_units_and_text_is_large_enough_and_within_the_figure(figures,
         assert -2.0 <= box.y0 < box.y1 <= figure.bbox.height + 2.0
 
 
-def test_a_file_has_the_width_and_resolution_of_the_style_and_equal_figures_give_equal_files(
-    figures, sheet, tmp_path
-):
+def test_file_has_the_size_of_its_style_and_is_reproducible(figures, sheet, tmp_path):
     from PIL import Image
 
     with figures.house_style(sheet(NARROW, "savefig.dpi: 120")):
@@ -165,9 +163,7 @@ def test_a_file_has_the_width_and_resolution_of_the_style_and_equal_figures_give
 
 
 @pytest.mark.parametrize("name", ["map", "after_stop"])
-def test_in_print_headings_and_explanations_are_a_text_beside_the_figure(
-    figures, make, sheet, tmp_path, name
-):
+def test_paper_style_writes_headings_to_a_text_file(figures, make, sheet, tmp_path, name):
     narrow = sheet(NARROW)
     with figures.house_style(narrow):
         plain = make(name)
@@ -181,7 +177,7 @@ def test_in_print_headings_and_explanations_are_a_text_beside_the_figure(
     assert all(words in caption for words in plain.get_supxlabel().split("\u2003 ") if words)
 
 
-def test_a_style_sheet_of_matplotlib_takes_precedence_and_ends_with_its_block(figures, sheet):
+def test_style_sheet_takes_precedence_within_its_block(figures, sheet):
     import matplotlib as mpl
 
     before = dict(mpl.rcParams)
@@ -208,7 +204,7 @@ def test_a_style_sheet_of_matplotlib_takes_precedence_and_ends_with_its_block(fi
         ("figure.figsize: 1, 1\n", "figure.figsize to 1: must be 2 to 40"),
     ],
 )
-def test_a_file_that_is_no_style_is_refused(figures, tmp_path, content, words):
+def test_wrong_style_is_refused(figures, tmp_path, content, words):
     path = tmp_path / "bad.mplstyle"
     if content is not None:
         path.write_text(content)
@@ -216,7 +212,7 @@ def test_a_file_that_is_no_style_is_refused(figures, tmp_path, content, words):
         pass
 
 
-def test_figure_4_shows_that_the_least_sensitive_shaper_leaves_36_percent(figures):
+def test_figure_4_shows_36_percent_for_the_least_sensitive_shaper(figures):
     (panel,) = figures.figure_4().axes
     assert any(text.startswith("35.8 %") for text in texts(panel))
     curves = {line.get_label(): line.get_xydata() for line in panel.get_lines()}
@@ -224,7 +220,7 @@ def test_figure_4_shows_that_the_least_sensitive_shaper_leaves_36_percent(figure
     assert np.interp(10.5, *curves["ZV"].T) == pytest.approx(0.0, abs=0.1)
 
 
-def test_figure_7_shows_that_rounded_delays_jump_and_fractional_ones_do_not(figures):
+def test_figure_7_shows_that_only_rounded_delays_jump(figures):
     rounded, fractional, *_ = figures.figure_7().axes[2].get_lines()
     assert np.max(np.abs(rounded.get_ydata())) > 50.0
     assert np.max(np.abs(fractional.get_ydata())) < 2.1
@@ -243,7 +239,7 @@ def test_figures_12_to_14_have_the_papers_five_panels_on_one_clock(figures, reco
     assert "repeatability, 0.03 mm" in texts(figure.axes[1])
 
 
-def test_figure_16_writes_the_rv_it_draws_and_draws_no_decay_through_noise(figures, recorded, one_motion):
+def test_figure_16_labels_the_drawn_rv_and_no_decay_in_noise(figures, recorded, one_motion):
     noise = 0.06 * np.random.default_rng(1).standard_normal((TICKS, 3))
     noisy = one_motion(37, alpha=noise)
     found = motions(noisy)[0]
@@ -258,7 +254,7 @@ def test_figure_16_writes_the_rv_it_draws_and_draws_no_decay_through_noise(figur
 
 
 @pytest.mark.parametrize(("counts", "drawn"), [([True, False, True, True], 3), ([False] * 4, 2)])
-def test_the_example_is_the_middle_one_of_the_moves_that_count(counts, drawn):
+def test_example_is_the_median_of_the_counted_moves(counts, drawn):
     peaks = [0.5, 0.1, 0.3, 0.4] if any(counts) else [0.01, 0.04, 0.03, 0.02]
     rows = [
         {"reduction_percent": 90.0 if one else None, "unshaped_peak_m_s2": peak}
@@ -270,7 +266,7 @@ def test_the_example_is_the_middle_one_of_the_moves_that_count(counts, drawn):
 @pytest.mark.parametrize(
     ("amplitude", "changed", "gained"), [(0.1, "less", "earlier"), (4.0, "more", "later")]
 )
-def test_the_overview_says_by_its_own_curves_whether_the_tool_shakes_less_and_rests_earlier(
+def test_overview_states_reduction_and_earlier_rest_of_its_curves(
     figures, one_motion, ring, amplitude, changed, gained
 ):
     pair = []
@@ -292,7 +288,7 @@ def test_the_overview_says_by_its_own_curves_whether_the_tool_shakes_less_and_re
     assert any(text.endswith(f"{gained} with shaping") for text in texts(panel) if "at rest" in text)
 
 
-def test_the_figure_of_the_catalogue_shows_every_shaper_that_is_for_the_damping(figures):
+def test_catalogue_figure_shows_every_shaper_for_the_damping(figures):
     zeta, mine = 0.34, custom("mine", [0.5, 0.5], [0.0, 0.5])
     *families, price = figures.catalogue_figure([*SHAPERS.values(), mine], zeta).axes
     lines = [line for panel in families for line in panel.get_lines() if line.get_label()[0] != "_"]

@@ -77,7 +77,7 @@ def flanges(path):
 
 
 @pytest.mark.parametrize(("robot", "truth"), [("ur5e", True), ("one-joint", False), (SEVEN, True)])
-def test_the_frames_end_where_the_flange_was(robot, truth, tmp_path):
+def test_frames_end_at_the_flange(robot, truth, tmp_path):
     run, path = recorded(tmp_path / "run.mcap", robot=robot, truth=truth), tmp_path / "out.mcap"
     notes = export(read(run), path)
     assert any("no truth" in note for note in notes) != truth
@@ -96,7 +96,7 @@ def run(tmp_path_factory):
     return recorded(tmp_path_factory.mktemp("run") / "run.mcap")
 
 
-def test_all_else_is_as_it_was_also_when_it_is_exported_again(run, tmp_path):
+def test_second_export_keeps_all_other_messages(run, tmp_path):
     once, twice = tmp_path / "once.mcap", tmp_path / "twice.mcap"
     assert export(read(run), once) == export(read(once), twice) == []
     first, again = read(run), read(twice)
@@ -106,7 +106,7 @@ def test_all_else_is_as_it_was_also_when_it_is_exported_again(run, tmp_path):
     assert once.stat().st_size < 1.15 * run.stat().st_size
 
 
-def test_messages_keep_to_their_schemas_and_the_layout_to_the_file(run, tmp_path):
+def test_messages_match_schemas_and_layout_matches_topics(run, tmp_path):
     path, beside = written_by(tmp_path / "out.mcap", "foxglove")
     export(read(run), path)
     found = messages(path)
@@ -126,13 +126,13 @@ def test_messages_keep_to_their_schemas_and_the_layout_to_the_file(run, tmp_path
     assert all(topic in last for panel in panels for topic in panel.get("topics", ()))
 
 
-def test_a_client_s_recording_is_refused_with_what_to_do(tmp_path):
+def test_recording_of_a_client_is_refused(tmp_path):
     client = recorded(tmp_path / "client.mcap", start=False)
-    with pytest.raises(RecordingError, match="does not say what its robot looks like: record it with"):
+    with pytest.raises(RecordingError, match="does not describe its robot: record it with"):
         export(read(client), tmp_path / "out.mcap")
 
 
-def test_a_file_that_was_cut_off_is_exported_up_to_there(run, tmp_path, capsys):
+def test_truncated_file_is_exported_up_to_the_damage(run, tmp_path, capsys):
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(run.read_bytes()[:-40_000])
     export_command(cut, to="foxglove")

@@ -7,7 +7,7 @@ from tvist_lab.frequency_error import ALLOWED, residual_over_error, settling_tim
 from tvist_shaping import SHAPERS
 
 
-def test_an_error_at_an_end_of_the_band_leaves_what_bounds_it():
+def test_error_at_the_end_of_the_band_leaves_the_allowed_residual():
     low, high = SHAPERS["zvd"].band(ALLOWED, 0.1)
     errors = np.array([1.0 / high - 1.0, 0.0, 1.0 / low - 1.0])
     assert residual_over_error(SHAPERS["zvd"], 0.1, errors) == pytest.approx(
@@ -16,17 +16,17 @@ def test_an_error_at_an_end_of_the_band_leaves_what_bounds_it():
 
 
 @pytest.mark.parametrize("name", ["zv", "zvd", "ei", "ei3"])
-def test_with_the_right_frequency_a_mode_settles_when_the_reference_stops(name):
+def test_mode_with_the_right_frequency_settles_at_the_stop(name):
     shaper = SHAPERS[name]
     assert settling_time(shaper, 8.0, 0.1, 0.0) == pytest.approx(shaper.impulses(8.0, 0.1).duration)
 
 
-def test_without_damping_what_is_left_never_decays():
+def test_undamped_residual_never_decays():
     assert settling_time(SHAPERS["zv"], 8.0, 0.0, 0.2) == np.inf
     assert np.isfinite(settling_time(SHAPERS["zv"], 8.0, 0.0, 0.0))
 
 
-def test_the_time_is_that_after_which_an_impulse_response_stays_small():
+def test_settling_time_is_that_of_the_impulse_response():
     shaper, f_d, zeta, error = SHAPERS["zv"], 8.0, 0.1, 0.15
     omega = 2.0 * np.pi * f_d
     sigma = omega * zeta / np.sqrt(1.0 - zeta**2)

@@ -7,25 +7,25 @@ from tvist_server.config import ServeConfig
 from tvist_server.option_values import StartError
 
 
-def test_changes_are_made_to_the_default_and_to_a_configuration_alike():
+def test_changes_apply_to_the_default_and_to_a_configuration():
     for config in (None, ServeConfig(seed=1, shaper="ei"), ServeConfig()):
         found = free_setup(config, seed=7, shaper="zvd", start="Q2")
         assert (found.seed, found.shaper) == (7, "zvd")
         assert found.q == found.description.poses["Q2"]
 
 
-def test_what_is_not_changed_stays_the_configurations_own():
+def test_unchanged_options_are_those_of_the_configuration():
     found = free_setup(ServeConfig(shaper="ei", clock="lockstep"), seed=7)
     assert (found.shaper, found.clock, found.truth) == ("ei", "lockstep", False)
 
 
-async def test_a_configuration_of_a_served_robot_answers_in_process_too():
+async def test_configuration_of_a_served_robot_works_in_process():
     async with robot_in_process(free_setup(ServeConfig(), seed=7)) as robot:
         assert (await robot.state()).tick == 0
         assert await robot.clock() == "free"
 
 
 @pytest.mark.parametrize("config", [None, ServeConfig()])
-def test_a_change_of_nothing_there_is_refused(config):
+def test_unknown_option_is_refused(config):
     with pytest.raises(StartError, match="'shapr': did you mean 'shaper'"):
         free_setup(config, shapr="zv")

@@ -62,9 +62,7 @@ SURE = set(FAULTS) - {"few motions", "slow", "loud"}
     fault=st.sampled_from(sorted(FAULTS)),
     gyroscope=st.booleans(),
 )
-def test_rows_are_right_to_3_ms_and_the_drift_to_2e_4_or_the_join_is_refused(
-    tmp_path_factory, seed, offset, drift, fault, gyroscope
-):
+def test_joined_rows_are_within_3_ms_or_refused(tmp_path_factory, seed, offset, drift, fault, gyroscope):
     devices = TwoDevices(seed, offset, drift, **FAULTS[fault])
     sensor, why = {} if gyroscope else {"names": FORCE}, ""
     try:
@@ -94,7 +92,7 @@ HEADS = {
 
 
 @pytest.mark.parametrize("kind", HEADS)
-def test_both_logs_are_read_in_any_units_and_under_any_names(tmp_path, kind):
+def test_both_logs_may_have_any_units_and_names(tmp_path, kind):
     robot, sensor, columns, imu_columns = HEADS[kind]
     devices = TwoDevices(3, -3.7, 0.004)
     found = join(tmp_path, devices, robot, sensor, columns, imu_columns)
@@ -108,7 +106,7 @@ def test_both_logs_are_read_in_any_units_and_under_any_names(tmp_path, kind):
     assert found["actual_q"] == pytest.approx(devices.q(found.time), abs=3e-3)
 
 
-def test_the_notes_tell_offset_and_drift_with_their_uncertainty_and_what_was_assumed(tmp_path):
+def test_notes_give_offset_and_drift_with_uncertainty(tmp_path):
     notes = " / ".join(join(tmp_path, TwoDevices(5, 2.5, -0.002)).notes)
     assert "joined by its gyroscope" in notes
     assert re.search(r"its clock is 2\.(499|500)\d s ahead \(± 0\.\d ms\)", notes)
@@ -137,7 +135,7 @@ def of(sensor=None, **how):
 
 
 REFUSED = {
-    "another motion": (unlike, "do not show one motion.*record both"),
+    "another motion": (unlike, "is not that of the joint angles.*record both"),
     "too little motion": (of(stroke=0.02), "too little: record both"),
     "motions that repeat": (of(same=True, motions=6, spare=-0.4), "motions repeat.*record both"),
     "one motion": (of(motions=1), "drift to .*record both"),
@@ -148,7 +146,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("kind", REFUSED)
-def test_a_join_that_cannot_be_trusted_is_refused_with_what_to_do(tmp_path, kind):
+def test_unreliable_join_is_refused(tmp_path, kind):
     attempt, words = REFUSED[kind]
     with pytest.raises(RecordingError, match=words):
         attempt(tmp_path)
@@ -166,7 +164,7 @@ SENSELESS = {
 
 
 @pytest.mark.parametrize("kind", SENSELESS)
-def test_a_sensors_log_without_sense_is_refused_and_never_ends_in_another_error(tmp_path, kind):
+def test_wrong_sensor_log_is_refused(tmp_path, kind):
     devices = TwoDevices(6, motions=3)
     t, values = SENSELESS[kind](*devices.sensor_rows())
     log = read(devices.robot(tmp_path / "robot.csv"))
@@ -177,14 +175,14 @@ def test_a_sensors_log_without_sense_is_refused_and_never_ends_in_another_error(
             joined(log, imu)
 
 
-def test_repeated_motions_are_joined_where_the_sensor_rested_before_and_after_them(tmp_path):
+def test_repeated_motions_are_joined_if_the_sensor_rested_around_them(tmp_path):
     devices = TwoDevices(1, 1.25, 0.003, same=True, motions=6, spare=5.0)
     late, slope = wrong_by(join(tmp_path, devices), devices)
     assert late < 1e-3
     assert slope < 1e-4
 
 
-def test_a_real_arms_sensor_is_put_back_on_its_clock(tmp_path):
+def test_sensor_of_a_real_arm_is_joined_on_its_clock(tmp_path):
     """Twenty seconds that others have joined, good to 5 ms, so that their drift is good to 5e-4."""
     recorded, offset, drift = read(RECORDED), -70.0, -0.005
     robot = write_csv(tmp_path / "robot.csv", {"timestamp": recorded.time, "actual_q": recorded["actual_q"]})
@@ -202,7 +200,7 @@ def test_a_real_arms_sensor_is_put_back_on_its_clock(tmp_path):
     assert clocks.correlation > 0.99
 
 
-def test_what_the_robot_shows_in_whole_numbers_is_not_mixed(tmp_path):
+def test_whole_numbers_are_not_interpolated(tmp_path):
     devices = TwoDevices(2, 0.5)
     t, q = devices.robot_rows()
     columns = {"timestamp": t, "actual_q": q, "mode": np.where(t > 4.0, 7.0, 3.0)}

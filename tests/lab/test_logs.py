@@ -39,7 +39,7 @@ FORMATS = {
 
 
 @pytest.mark.parametrize(("form", "lag"), [("commas", 0.0), *((form, 0.025) for form in FORMATS)])
-def test_motions_and_modes_are_found_in_every_format_by_the_logs_own_clock(tmp_path, form, lag):
+def test_motions_and_modes_are_found_in_every_format(tmp_path, form, lag):
     log = SyntheticLog(lag=lag, motions=1)
     (result,) = analyze(read(FORMATS[form](log, tmp_path)))
     assert [result.start_s, result.stop_s] == pytest.approx([*log.starts, *log.stops], abs=0.012)
@@ -48,12 +48,12 @@ def test_motions_and_modes_are_found_in_every_format_by_the_logs_own_clock(tmp_p
     assert result.residual_vibration_m_s2 == pytest.approx(1.0, rel=0.15)
 
 
-def test_a_slow_log_is_measured_too(tmp_path):
+def test_slow_log_is_measured(tmp_path):
     log = SyntheticLog(rate=100.0, lag=0.025)
     assert [within(result) for result in analyze(read(log.csv(tmp_path / "log.csv")))] == [True, True]
 
 
-def test_a_rosbag_is_read_in_any_order_of_joints_and_with_slower_joint_states(tmp_path):
+def test_rosbag_may_have_any_joint_order_and_slow_joint_states(tmp_path):
     log = SyntheticLog(lag=0.025, motions=1)
     recording = read(log.rosbag(tmp_path / "bag", every=4, order=(5, 0, 3, 1, 4, 2)))
     seen = np.isfinite(recording["actual_q"]).all(axis=1)
@@ -63,7 +63,7 @@ def test_a_rosbag_is_read_in_any_order_of_joints_and_with_slower_joint_states(tm
     assert result.stop_s == pytest.approx(log.stops[0] + 0.025, abs=0.02)
 
 
-def test_without_a_target_motions_come_from_the_measured_angles_and_the_notes_say_so(tmp_path):
+def test_motions_without_a_target_come_from_measured_angles(tmp_path):
     log = SyntheticLog().without("target_q")
     results = analyze(read(log.csv(tmp_path / "log.csv")))
     assert [result.stop_s for result in results] == pytest.approx(log.stops, abs=0.03)
@@ -73,14 +73,16 @@ def test_without_a_target_motions_come_from_the_measured_angles_and_the_notes_sa
     assert "servo_lag_ms" in results[0].notes
 
 
-def test_what_a_log_lacks_is_null_with_a_reason_and_the_rest_is_measured(tmp_path):
-    log = SyntheticLog(joints=7).without("actual_TCP_pose")
+def test_missing_columns_give_null_with_a_reason(tmp_path):
+    log = SyntheticLog(joints=7, motions=1).without("actual_TCP_pose")
     results = analyze(read(log.csv(tmp_path / "log.csv")))
     assert all(within(result) for result in results)
     for field in ("overshoot_m", "stabilisation_ms", "cycle_ms"):
         assert getattr(results[0], field) is None
         assert "actual_TCP_pose" in results[0].notes[field]
-    blind = analyze(read(SyntheticLog().without("actual_tool_accelerometer").csv(tmp_path / "blind.csv")))[0]
+    blind = analyze(
+        read(SyntheticLog(motions=1).without("actual_tool_accelerometer").csv(tmp_path / "blind.csv"))
+    )[0]
     for field in ("f_d_hz", "zeta", "residual_vibration_m_s2", "still_after_ms", "peak_m_s2"):
         assert getattr(blind, field) is None
         assert "actual_tool_accelerometer" in blind.notes[field]
@@ -88,14 +90,14 @@ def test_what_a_log_lacks_is_null_with_a_reason_and_the_rest_is_measured(tmp_pat
 
 
 @pytest.mark.parametrize(("lag", "mode"), [(0.0, MODE), (0.04, (7.0, 0.3, 1.5))])
-def test_without_measured_angles_the_lag_shows_in_the_accelerometer(tmp_path, lag, mode):
-    log = SyntheticLog(lag=lag, modes=(mode,)).without("actual_q")
-    results = analyze(read(log.csv(tmp_path / "log.csv")))
-    assert all(within(result, *mode[:2]) for result in results)
-    assert [result.servo_lag_ms for result in results] == pytest.approx([1e3 * lag] * 2, abs=4.0)
+def test_lag_without_measured_angles_comes_from_the_accelerometer(tmp_path, lag, mode):
+    log = SyntheticLog(lag=lag, modes=(mode,), motions=1).without("actual_q")
+    (result,) = analyze(read(log.csv(tmp_path / "log.csv")))
+    assert within(result, *mode[:2])
+    assert result.servo_lag_ms == pytest.approx(1e3 * lag, abs=4.0)
 
 
-def test_a_rotated_tool_changes_no_figure_since_gravity_is_what_the_sensor_shows_at_rest(tmp_path):
+def test_rotated_tool_changes_no_result(tmp_path):
     log = SyntheticLog(motions=1)
     before = analyze(read(log.csv(tmp_path / "log.csv")))
     log.columns["actual_TCP_pose"][:, 3:] = [0.3, -1.0, 2.0]
@@ -103,7 +105,7 @@ def test_a_rotated_tool_changes_no_figure_since_gravity_is_what_the_sensor_shows
     assert [result.as_dict() for result in before] == [result.as_dict() for result in after]
 
 
-def test_missing_rows_do_not_spoil_a_fit(tmp_path):
+def test_missing_rows_do_not_bias_the_fit(tmp_path):
     log = SyntheticLog(lag=0.025)
     random = np.random.default_rng(0)
     kept = random.random(len(log.columns["timestamp"])) > 0.2
@@ -130,7 +132,7 @@ def with_cell(lines, cell, row=300, column=4):
     return [*lines[:row], ",".join(cells), *lines[row + 1 :]]
 
 
-def test_an_empty_cell_is_missing_and_not_zero(tmp_path):
+def test_empty_cell_is_missing_and_not_zero(tmp_path):
     path, lines = lines_of(tmp_path)
     place = lines[0].split(",").index("actual_tool_accelerometer_1")
     path.write_text("\n".join(with_cell(lines, "", 700, place)) + "\n")
@@ -159,12 +161,11 @@ EDITED = {
         "2 rows out of order sorted by timestamp, the first in line 402",
     ),
     "cut off": (lambda lines: [*lines[:-1], lines[-1][:-5]], "line 2701 has no end and was left out"),
-}
-"""Changes of the lines of a good log without its last line break, and the note on them."""
+}  # changes of the lines of a good log without its last line break, and the note on them
 
 
 @pytest.mark.parametrize("kind", EDITED)
-def test_lines_that_are_not_whole_or_not_in_their_place_are_left_out_or_sorted_and_said(tmp_path, kind):
+def test_damaged_lines_are_omitted_or_sorted_with_a_note(tmp_path, kind):
     change, words = EDITED[kind]
     path, lines = lines_of(tmp_path)
     path.write_text("\n".join(change(lines)))
@@ -188,12 +189,11 @@ REFUSED = {
         r"line 301, column target_q_3: 1e\+308",
     ),
     "decimal commas": (lambda lines: [line.replace(".", ",") for line in lines], "decimal comma"),
-}
-"""Changes of a good log, and what is said of it then."""
+}  # changes of a good log, and what is said of it then
 
 
 @pytest.mark.parametrize("kind", REFUSED)
-def test_what_cannot_be_measured_is_refused_with_file_cause_and_line(tmp_path, kind):
+def test_unusable_log_is_refused_with_file_and_line(tmp_path, kind):
     change, words = REFUSED[kind]
     path, lines = lines_of(tmp_path)
     path.write_text("\n".join(change(lines)) + "\n")
@@ -215,21 +215,21 @@ def test_what_cannot_be_measured_is_refused_with_file_cause_and_line(tmp_path, k
         (b"Dear diary, nothing moved today.\n", "is no log that tvist reads: its line 1"),
     ],
 )
-def test_other_files_are_refused_by_name(tmp_path, content, words):
+def test_files_of_other_kinds_are_refused(tmp_path, content, words):
     path = tmp_path / "other"
     path.write_bytes(content)
     with pytest.raises(RecordingError, match=words):
         read(path)
 
 
-def test_missing_files_and_folders_without_a_bag_are_refused(tmp_path):
+def test_missing_files_and_folders_without_a_rosbag_are_refused(tmp_path):
     with pytest.raises(RecordingError, match="No such file"):
         read(tmp_path / "none.csv")
     with pytest.raises(RecordingError, match="no MCAP file is there"):
         read(tmp_path)
 
 
-def test_motions_that_correspond_are_compared_and_others_are_said(tmp_path):
+def test_corresponding_motions_are_compared_and_others_listed(tmp_path):
     def measured_of(log):
         return MeasuredRecording.of(read(log.csv(tmp_path / "log.csv")))
 
@@ -241,16 +241,16 @@ def test_motions_that_correspond_are_compared_and_others_are_said(tmp_path):
     short = compare(loud, measured_of(SyntheticLog(motions=1)))
     assert [(motion.a, motion.b) for motion in short.motions] == [(1, 1)]
     assert (short.only_in_a, short.only_in_b) == ((2,), ())
-    seven = compare(loud, measured_of(SyntheticLog(joints=7)))
-    assert (seven.motions, seven.only_in_a, seven.only_in_b) == ((), (1, 2), (1, 2))
+    seven = compare(loud, measured_of(SyntheticLog(joints=7, motions=1)))
+    assert (seven.motions, seven.only_in_a, seven.only_in_b) == ((), (1, 2), (1,))
 
 
-def test_a_log_at_rest_has_no_motion(tmp_path):
+def test_log_at_rest_has_no_motion(tmp_path):
     assert motions(read(SyntheticLog(motions=0, rest=2.0).csv(tmp_path / "log.csv"))) == []
     assert motions(read(SyntheticLog(motions=0).without("target_q").csv(tmp_path / "log.csv"))) == []
 
 
-def test_a_packet_that_lost_bytes_is_left_out_and_the_next_ones_are_read(tmp_path):
+def test_damaged_packet_is_omitted_and_later_ones_are_read(tmp_path):
     path = SyntheticLog().dump(tmp_path / "dump")
     data = path.read_bytes()
     path.write_bytes(data[:600_000] + data[600_037:])
@@ -259,7 +259,7 @@ def test_a_packet_that_lost_bytes_is_left_out_and_the_next_ones_are_read(tmp_pat
     assert all(within(result) for result in analyze(recording))
 
 
-def test_a_csv_may_be_packed_by_gzip_and_one_made_to_fill_the_memory_is_refused(tmp_path):
+def test_csv_may_be_gzipped_but_not_a_decompression_bomb(tmp_path):
     plain = SyntheticLog(motions=1).csv(tmp_path / "log.csv")
     packed = tmp_path / "log.csv.gz"
     packed.write_bytes(gzip.compress(plain.read_bytes()))
@@ -298,14 +298,14 @@ def test_any_names_units_and_separators_are_read(tmp_path):
         read(path)
 
 
-def test_an_arm_that_still_rings_is_not_called_noise(tmp_path):
+def test_vibration_at_the_end_is_not_called_noise(tmp_path):
     ringing = analyze(read(SyntheticLog(modes=((9.0, 0.01, 2.0),), motions=1).csv(tmp_path / "a.csv")))[0]
     noisy = analyze(read(SyntheticLog(noise=0.2, motions=1).csv(tmp_path / "b.csv")))[0]
     assert "still rang" in ringing.notes["still_after_ms"]
     assert "noise" in noisy.notes["still_after_ms"]
 
 
-def test_notes_count_motions_instead_of_listing_them():
+def test_notes_count_motions():
     results = [MotionResult(0.0, 1.0, notes={"f_d_hz": f"only 0.{n} s"} if n < 8 else {}) for n in range(10)]
     assert grouped_notes(results) == ["8 of 10 motions, frequency: as only 0.0 s"]
 
@@ -337,7 +337,7 @@ VENDORS = {
 
 
 @pytest.mark.parametrize("vendor", VENDORS)
-def test_names_of_other_vendors_are_recognised_with_their_units_and_said(tmp_path, vendor):
+def test_names_and_units_of_other_vendors_are_recognized(tmp_path, vendor):
     header, rows = VENDORS[vendor]
     t = 10.0 + 0.004 * np.arange(500)
     q, qd = np.array([np.sin(t), 0.1 * np.cos(t)]), np.array([np.cos(t), -0.1 * np.sin(t)])
@@ -356,7 +356,7 @@ def test_names_of_other_vendors_are_recognised_with_their_units_and_said(tmp_pat
 @pytest.mark.parametrize(
     ("separator", "comma"), [(",", False), (";", True), (" ", False), ("\t", True), (",", True)]
 )
-def test_a_file_without_a_header_is_read_by_the_places_of_its_columns(tmp_path, separator, comma):
+def test_file_without_header_is_read_by_column_numbers(tmp_path, separator, comma):
     t = 0.01 * np.arange(300)
     table = np.column_stack([np.arange(300), t, np.sin(t), np.cos(t), 20 * t, 9 * t])
     lines = [separator.join(f"{value:.6f}" for value in row) for row in table]
@@ -373,7 +373,7 @@ def test_a_file_without_a_header_is_read_by_the_places_of_its_columns(tmp_path, 
 
 
 @pytest.mark.parametrize("columns", ["time=1,q=2-9", "time=0,q=2-3", "time=1,q=3-2"])
-def test_places_that_a_file_does_not_have_are_refused_with_those_that_it_has(tmp_path, columns):
+def test_missing_column_numbers_are_refused(tmp_path, columns):
     path = tmp_path / "log.txt"
     path.write_text("".join(f"{0.01 * n},1,{n}\n" for n in range(50)))
     with pytest.raises(RecordingError, match=r"1 to 3, as in .*=2-7"):
@@ -381,7 +381,7 @@ def test_places_that_a_file_does_not_have_are_refused_with_those_that_it_has(tmp
 
 
 @pytest.mark.parametrize("kind", ["lists", "arrays", "npz"])
-def test_vectors_of_a_table_are_read_under_any_name_and_named_when_they_are_not(tmp_path, kind):
+def test_vectors_of_a_table_may_have_any_name(tmp_path, kind):
     t = 0.002 * np.arange(100)
     q = np.column_stack([np.sin(t), np.cos(t)])
     path = tmp_path / ("log.npz" if kind == "npz" else "log.parquet")
@@ -391,13 +391,14 @@ def test_vectors_of_a_table_are_read_under_any_name_and_named_when_they_are_not(
         lists = pl.Series("observation.state", q, dtype=pl.Array(pl.Float64, 2))
         lists = lists if kind == "arrays" else lists.arr.to_list()
         pl.DataFrame([pl.Series("stamp", t), lists]).write_parquet(path)
-    with pytest.raises(RecordingError, match=r"are stamp, observation\.state_0, observation\.state_1"):
-        read(path)
+    if kind == "lists":
+        with pytest.raises(RecordingError, match=r"are stamp, observation\.state_0, observation\.state_1"):
+            read(path)
     found = read(path, "time=stamp,q=observation.state_{}:rad")
     assert found["actual_q"] == pytest.approx(q)
 
 
-def test_a_format_of_ones_own_is_a_function_and_its_names_units_and_gaps_are_found(tmp_path, monkeypatch):
+def test_user_format_is_a_function(tmp_path, monkeypatch):
     """A made-up program writes one number after another as text, in ms and degrees."""
 
     def read_numbers(path):
@@ -419,7 +420,7 @@ def test_a_format_of_ones_own_is_a_function_and_its_names_units_and_gaps_are_fou
 
 
 @pytest.mark.parametrize("without", [(), ("target_q",)])
-def test_a_pause_of_any_length_changes_no_figure_and_takes_no_memory(without, tmp_path):
+def test_pause_of_any_length_changes_no_result_and_takes_no_memory(without, tmp_path):
     log, pause = SyntheticLog().without(*without), 7e8
     expected = analyze(read(log.csv(tmp_path / "log.csv")))
     middle = len(log.columns["timestamp"]) // 2
@@ -430,7 +431,7 @@ def test_a_pause_of_any_length_changes_no_figure_and_takes_no_memory(without, tm
     assert [one.stop_s for one in found] == pytest.approx(stops, abs=0.005)
 
 
-def test_a_column_of_text_that_is_not_needed_is_left_out_and_one_that_is_needed_is_refused(tmp_path):
+def test_text_column_is_omitted_or_refused_if_needed(tmp_path):
     t = 0.012 * np.arange(60)
     rows = [f"2024-01-02 03:04:05,{1e3 * s + 5e8:.0f},ä,{57.3 * np.sin(s):.4f},{s}" for s in t]
     header = "Timestamp,IPOC,state,AIPos.A1,AIPos.A2"

@@ -31,7 +31,7 @@ def make(ur5e):
 
 
 @pytest.mark.parametrize("count", [20, 60])
-def test_the_interval_contains_the_median_of_a_skewed_distribution_as_often_as_it_promises(count):
+def test_interval_contains_the_median_at_its_confidence(count):
     """At least 95 %, and not much more, for a distribution that no normal interval would suit."""
     random = np.random.default_rng(1)
     drawn = [exact_interval(random.exponential(1.0, count) - np.log(2.0)) for _ in range(4000)]
@@ -39,7 +39,7 @@ def test_the_interval_contains_the_median_of_a_skewed_distribution_as_often_as_i
     assert 0.95 - 3.0 * np.sqrt(0.05 * 0.95 / 4000) <= held < 0.985
 
 
-def test_a_verdict_agrees_with_the_sign_test():
+def test_verdict_agrees_with_the_sign_test():
     """An end of the interval is where the exact test begins to reject; equal values are no difference."""
     random = np.random.default_rng(2)
     for shift in np.linspace(-1.0, 1.0, 41):
@@ -62,7 +62,7 @@ def entries(made, differences, base=90.0):
     return made.summary(made.frame(rows))
 
 
-def test_the_report_pairs_moves_and_says_nothing_of_too_few(make):
+def test_report_pairs_moves_and_gives_no_verdict_on_too_few(make):
     differences, made = np.linspace(0.5, 3.0, 24), make(20)
     clear, few = entries(made, differences)
     assert clear["difference_median"] == pytest.approx(np.median(differences))
@@ -78,7 +78,7 @@ def test_the_report_pairs_moves_and_says_nothing_of_too_few(make):
     assert low <= other["difference_p5"] <= high < 0.0
 
 
-def test_both_make_the_same_moves_on_the_same_arms(make):
+def test_both_shapers_make_the_same_moves_on_the_same_arms(make):
     """A method compared with itself differs nowhere, not in the last bit; and nineteen moves are refused."""
     job = next(make(20).jobs())
     found = measure(replace(job, methods=job.methods[:1] * 2))

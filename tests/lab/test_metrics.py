@@ -41,11 +41,11 @@ def steps(*spans):
     return sum(np.clip((tick - start) / (stop - start), 0.0, 1.0) for start, stop in spans)
 
 
-def test_a_motion_shows_in_the_reference_from_its_last_tick_at_rest_to_its_last_tick_that_moves(one_motion):
+def test_motion_spans_the_last_tick_at_rest_to_the_last_moving_tick(one_motion):
     assert motions(one_motion()) == [MotionRows(100, 500, 501, 1500)]
 
 
-def test_durations_are_those_of_each_signal_and_the_published_tick_is_no_delay(one_motion):
+def test_delay_excludes_the_tick_of_publication(one_motion):
     recording = one_motion(shaped_ticks=37)
     (motion,) = motions(recording)
     assert motion.duration(recording) == pytest.approx(0.8)
@@ -55,7 +55,7 @@ def test_durations_are_those_of_each_signal_and_the_published_tick_is_no_delay(o
     assert motions(unshaped)[0].delay(unshaped) == 0.0
 
 
-def test_events_tell_motions_apart_that_follow_each_other_at_once(make_recording, event):
+def test_events_separate_motions_without_rest(make_recording, event):
     reference = steps((100, 500), (501, 900))
     told = ((101, "started", 1), (501, "done", 1), (502, "started", 2), (901, "done", 2))
     events = [event(tick, f"motion_{what}", number) for tick, what, number in told]
@@ -66,7 +66,7 @@ def test_events_tell_motions_apart_that_follow_each_other_at_once(make_recording
     assert first.end == second.start + 1
 
 
-def test_a_stopped_motion_says_so_and_one_that_goes_nowhere_is_none(one_motion, event):
+def test_stopped_motion_is_marked_and_an_empty_one_omitted(one_motion, event):
     events = [event(50, "motion_started", 1), event(51, "motion_done", 1)]
     events += [event(101, "motion_started", 2), event(505, "motion_stopped", 2)]
     (motion,) = motions(one_motion(events=events))
@@ -74,7 +74,7 @@ def test_a_stopped_motion_says_so_and_one_that_goes_nowhere_is_none(one_motion, 
     assert motion.stopped
 
 
-def test_motions_with_rest_between_them_are_apart(make_recording):
+def test_rest_separates_motions(make_recording):
     reference = steps((100, 300), (400, 500))
     found = [
         (one.start, one.reference_stop, one.end) for one in motions(make_recording(reference, reference))
@@ -82,14 +82,14 @@ def test_motions_with_rest_between_them_are_apart(make_recording):
     assert found == [(100, 300, 401), (400, 500, 1500)]
 
 
-def test_a_simulation_put_elsewhere_is_no_motion_and_ends_the_one_before(make_recording):
+def test_reset_of_the_simulation_ends_a_motion(make_recording):
     reference = steps((100, 500))
     reference[1000:] -= 0.7
     (motion,) = motions(make_recording(reference, np.roll(reference, 1)))
     assert motion == MotionRows(100, 500, 501, 1000)
 
 
-def test_times_hold_where_ticks_are_missing(one_motion):
+def test_times_are_right_with_missing_ticks(one_motion):
     recording = one_motion(shaped_ticks=20)
     kept = np.delete(np.arange(TICKS), np.arange(200, 260))
     thinned = type(recording)({name: column[kept] for name, column in recording.columns.items()})
@@ -98,7 +98,7 @@ def test_times_hold_where_ticks_are_missing(one_motion):
     assert motion.delay(thinned) == pytest.approx(0.040)
 
 
-def test_a_robot_at_rest_has_no_motions(make_recording):
+def test_robot_at_rest_has_no_motions(make_recording):
     assert motions(make_recording()) == []
     assert motions(make_recording(ticks=1)) == []
 
@@ -131,7 +131,7 @@ ONE_SWING = [
 ]  # fmt: skip
 
 
-def test_times_and_overshoot_of_one_swing_out_of_the_band_are_read_between_ticks(one_motion):
+def test_settling_is_interpolated_between_ticks(one_motion):
     recording, motion = taken(one_motion, drawn(ONE_SWING))
     settled = settling(recording, motion)
     assert settled.enter == pytest.approx((550.5 - 100) * 0.002, abs=1e-6)
@@ -141,14 +141,14 @@ def test_times_and_overshoot_of_one_swing_out_of_the_band_are_read_between_ticks
     np.testing.assert_allclose(attained_position(recording, motion), END, atol=1e-9)
 
 
-def test_a_tool_that_stays_in_the_band_needs_no_stabilisation_and_has_no_overshoot(one_motion):
+def test_tool_within_the_band_has_no_stabilisation_or_overshoot(one_motion):
     E = drawn([(100, 0.5), (550, 4e-5), (551, 2e-5), (560, 2.5e-5), (700, 0.0)])
     settled = settling(*taken(one_motion, E))
     assert settled.stabilisation == settled.overshoot == 0.0
     assert settled.cycle == settled.enter
 
 
-def test_a_pass_through_the_end_counts_as_overshoot_on_the_other_side(one_motion):
+def test_overshoot_counts_beyond_the_end(one_motion):
     E = drawn([(100, -0.5), (540, -1e-4), (548, 3e-4), (600, 0.0)])
     settled = settling(*taken(one_motion, E))
     assert settled.overshoot == pytest.approx(3e-4)
@@ -163,9 +163,7 @@ def test_a_pass_through_the_end_counts_as_overshoot_on_the_other_side(one_motion
         (-drawn([(100, 0.5), (600, 0.0)]), TICKS, "moved by less than"),
     ],
 )
-def test_a_tool_that_still_swings_hardly_moves_or_rests_too_shortly_is_not_measurable(
-    one_motion, E, ticks, why
-):
+def test_settling_is_not_measurable_without_motion_and_rest(one_motion, E, ticks, why):
     position = along(drawn([(100, 0.5), (600, 0.0)]) + E)[:ticks]
     with pytest.raises(NotMeasurableError, match=why):
         settling(*with_motion(one_motion(ticks=ticks, position=position)))
@@ -177,7 +175,7 @@ STOP = 501
 @pytest.mark.parametrize(
     ("f_d", "zeta", "axis"), [(15.0, 0.14, (1.0, 0.0, 0.0)), (6.7, 0.1, (1.0, -2.0, 0.5))]
 )
-def test_rv_of_an_exact_damped_sine_is_its_amplitude(one_motion, ring, f_d, zeta, axis):
+def test_rv_of_a_damped_sine_is_its_amplitude(one_motion, ring, f_d, zeta, axis):
     recording, motion = with_motion(one_motion(alpha=ring(TICKS, STOP, f_d, zeta, 1.2, axis=axis)))
     rv = residual(recording, motion)
     assert rv.fitted
@@ -188,7 +186,7 @@ def test_rv_of_an_exact_damped_sine_is_its_amplitude(one_motion, ring, f_d, zeta
     assert rv.stop == pytest.approx(0.002 * STOP)
 
 
-def test_fewer_than_two_peaks_give_the_largest_value_and_say_so(one_motion, ring):
+def test_rv_with_fewer_than_two_peaks_is_the_largest_value(one_motion, ring):
     recording, motion = with_motion(one_motion(alpha=ring(TICKS, STOP, 6.7, 0.34, 0.3)))
     rv = residual(recording, motion)
     assert not rv.fitted
@@ -198,13 +196,13 @@ def test_fewer_than_two_peaks_give_the_largest_value_and_say_so(one_motion, ring
     np.testing.assert_allclose(rv.curve(np.array([1.1, 1.2])), rv.value)
 
 
-def test_only_the_three_tenths_of_a_second_after_the_tick_of_the_shaped_stop_count(one_motion):
+def test_rv_counts_0_3_s_after_the_shaped_stop(one_motion):
     alpha = np.zeros((TICKS, 3))
     alpha[: STOP + 40 + 1, 0] = alpha[STOP + 40 + 152 :, 0] = 5.0
     assert residual(*with_motion(one_motion(40, alpha=alpha))).value == pytest.approx(0.0, abs=1e-12)
 
 
-def test_peaks_that_grow_are_fitted_by_a_constant_not_by_a_growing_exponential(one_motion):
+def test_growing_peaks_are_fitted_by_a_constant(one_motion):
     alpha = np.zeros((TICKS, 3))
     alpha[STOP + 20, 0], alpha[STOP + 60, 0] = 0.2, 0.3
     rv = residual(*with_motion(one_motion(alpha=alpha)))
@@ -219,13 +217,13 @@ def loud_until(tick, level=0.2):
 
 
 @pytest.mark.parametrize("shaped_ticks", [0, 37])
-def test_still_counts_from_the_start_of_the_unshaped_reference_on_the_truth_channel(one_motion, shaped_ticks):
+def test_time_of_rest_counts_from_the_start_of_the_reference(one_motion, shaped_ticks):
     noise = np.random.default_rng(0).standard_normal((TICKS, 3))
     recording = one_motion(shaped_ticks, truth=loud_until(650), alpha=noise)
     assert still_after(*with_motion(recording)) == pytest.approx(550 * 0.002)
 
 
-def test_an_arm_below_the_threshold_is_still_from_the_start_and_one_that_never_gets_still_not_measurable(
+def test_time_of_rest_is_zero_or_not_measurable_at_the_extremes(
     one_motion,
 ):
     assert still_after(*with_motion(one_motion(truth=loud_until(650, 0.09)))) == 0.0
@@ -233,7 +231,7 @@ def test_an_arm_below_the_threshold_is_still_from_the_start_and_one_that_never_g
         still_after(*with_motion(one_motion(truth=loud_until(TICKS))))
 
 
-def test_the_peak_after_the_stop_leaves_out_the_last_ramp_and_needs_the_truth(one_motion):
+def test_peak_after_the_stop_omits_the_last_ramp_and_needs_the_truth(one_motion):
     truth = np.zeros((TICKS, 3))
     truth[541 + 5, 0] = 7.0
     truth[541 + 6, 0] = 0.4
@@ -244,7 +242,7 @@ def test_the_peak_after_the_stop_leaves_out_the_last_ramp_and_needs_the_truth(on
 
 
 @pytest.mark.parametrize(("delay", "peak"), [(0.074, 0.5), (0.0, 2.0)])
-def test_the_declared_delay_is_granted_to_a_shaper_and_no_more(one_motion, delay, peak):
+def test_vibration_counts_from_the_declared_delay(one_motion, delay, peak):
     truth = np.zeros((TICKS, 3))
     truth[: 501 + 37 + 1, 0] = 2.0
     truth[501 + 37 + 1, 0] = 0.5
@@ -252,14 +250,14 @@ def test_the_declared_delay_is_granted_to_a_shaper_and_no_more(one_motion, delay
     assert vibration_after_stop(*with_motion(recording))[0] == pytest.approx(peak)
 
 
-def test_the_envelope_of_a_lightly_damped_ring_down_is_its_amplitude_and_slow_drift_is_none(ring):
+def test_envelope_is_the_amplitude_without_slow_drift(ring):
     alpha = ring(700, 0, 10.0, 0.02, 1.0, axis=(1.0, 1.0, 1.0), phase=1.0)
     assert np.max(envelope(alpha, 0.002)) == pytest.approx(1.0, abs=0.08)
     drift = np.tile(np.linspace(1.0, 2.0, 700)[:, None], (1, 3))
     assert np.max(envelope(drift, 0.002)[100:600]) < 0.05
 
 
-def test_the_rigid_acceleration_of_a_turning_tool_points_to_its_axis(make_recording):
+def test_rigid_acceleration_of_a_turning_tool_points_to_its_axis(make_recording):
     t = 0.002 * np.arange(TICKS)
     q = np.clip(t - 0.2, 0.0, 2.0)
     recording = make_recording(q, np.roll(q, 1))
@@ -278,7 +276,7 @@ def test_the_rigid_acceleration_of_a_turning_tool_points_to_its_axis(make_record
     assert in_motion_rms(shaken, motion, rigid) == pytest.approx(0.5)
 
 
-def test_peaks_of_the_shaped_reference_are_those_of_any_joint_within_the_motion(one_motion):
+def test_peak_acceleration_is_the_largest_of_any_joint(one_motion):
     qdd, qd = np.zeros((2, TICKS, 6))
     qdd[300, 2], qd[400, 4] = -2.3, -1.4
     qdd[900, 0], qd[900, 0] = 50.0, 50.0
@@ -287,7 +285,7 @@ def test_peaks_of_the_shaped_reference_are_those_of_any_joint_within_the_motion(
     assert peak_velocity(recording, motion) == 1.4
 
 
-def test_a_tool_at_rest_in_any_orientation_feels_no_acceleration(make_recording):
+def test_tool_at_rest_in_any_orientation_has_no_acceleration(make_recording):
     orientations = Rotation.random(200, rng=np.random.default_rng(1))
     force = orientations.inv().apply([0.0, 0.0, 9.81])
     recording = make_recording(ticks=200, rotation=orientations.as_rotvec(), actual_tool_accelerometer=force)
@@ -305,7 +303,7 @@ def test_acceleration_is_in_the_frame_of_the_flange(make_recording):
     np.testing.assert_allclose(amplitude(alpha), 2.0)
 
 
-def test_truth_that_was_not_recorded_or_has_holes_is_said(make_recording):
+def test_missing_truth_is_reported(make_recording):
     with pytest.raises(RecordingError, match="was truth recorded"):
         tool_acceleration(make_recording(), truth=True)
     holes = np.full((1500, 3), np.nan)
@@ -315,7 +313,7 @@ def test_truth_that_was_not_recorded_or_has_holes_is_said(make_recording):
     assert tool_acceleration(make_recording(truth=holes), truth=True, rows=slice(1, None)).shape == (1499, 3)
 
 
-def test_without_truth_the_sensor_is_taken_below_60_hz(make_recording):
+def test_sensor_below_60_hz_replaces_missing_truth(make_recording):
     noise = 0.03 * np.random.default_rng(0).standard_normal((1500, 3))
     loud = amplitude(tool_acceleration(make_recording(alpha=noise)))
     quiet = amplitude(best_tool_acceleration(make_recording(alpha=noise)))
@@ -330,7 +328,7 @@ def result(**values):
     return MotionResult(**{**usual, "overshoot_m": 5e-4, "residual_vibration_m_s2": 1.0, **values})
 
 
-def test_an_impact_is_the_change_of_the_means_in_percent_as_the_paper_signs_it():
+def test_impact_is_the_signed_change_of_means_in_percent():
     unshaped = [result(residual_vibration_m_s2=one, overshoot_m=0.0) for one in (1.0, 1.22)]
     shaped = [result(residual_vibration_m_s2=one, overshoot_m=0.0) for one in (0.10, 0.16)]
     table = table_2({"Q1-Q2": Runs(unshaped, shaped)})
@@ -346,7 +344,7 @@ def test_an_impact_is_the_change_of_the_means_in_percent_as_the_paper_signs_it()
     assert row["impact_percent"]["overshoot"] is None, "there is no impact on what was nothing before"
 
 
-def test_runs_that_could_not_be_measured_are_left_out_of_a_mean_and_noted():
+def test_unmeasurable_runs_are_omitted_from_the_mean_with_a_note():
     silent = result(overshoot_m=None, notes={"overshoot_m": "the tool had not settled"})
     runs = {"Q1-Q2": Runs([result(), silent, result(overshoot_m=1e-4)], [silent])}
     row = table_2(runs)["Q1-Q2"]
@@ -359,7 +357,7 @@ def test_runs_that_could_not_be_measured_are_left_out_of_a_mean_and_noted():
     ]
 
 
-def test_a_recording_is_measured_motion_by_motion(one_motion, ring):
+def test_recording_is_measured_motion_by_motion(one_motion, ring):
     noise = 0.03 * np.random.default_rng(0).standard_normal((TICKS, 3))
     alpha = ring(TICKS, 538, 10.0, 0.1, 1.0, axis=(0.0, 1.0, 1.0))
     position = np.zeros((TICKS, 3))
@@ -376,7 +374,7 @@ def test_a_recording_is_measured_motion_by_motion(one_motion, ring):
     assert set(measured.notes) <= {"servo_lag_ms"}  # the made-up arm does not follow
 
 
-def test_what_is_not_measurable_is_null_with_the_reason_under_its_name(one_motion):
+def test_unmeasurable_values_are_null_with_a_reason(one_motion):
     (measured,) = analyze(one_motion(ticks=560))
     plain = json.loads(json.dumps(measured.as_dict(), allow_nan=False))
     missing = {"stabilisation_ms", "cycle_ms", "overshoot_m", "residual_vibration_m_s2", "f_d_hz", "zeta"}
@@ -386,7 +384,7 @@ def test_what_is_not_measurable_is_null_with_the_reason_under_its_name(one_motio
     assert "0.2 s" in plain["notes"]["f_d_hz"]
 
 
-def test_an_rv_that_is_no_fitted_decay_and_a_motion_cut_short_are_noted(one_motion, event):
+def test_unfitted_rv_and_stopped_motion_are_noted(one_motion, event):
     events = [event(101, "motion_started", 1), event(501, "motion_stopped", 1)]
     (measured,) = analyze(one_motion(events=events))
     assert measured.residual_vibration_m_s2 is not None

@@ -29,7 +29,7 @@ def marimo():
     return pytest.importorskip("marimo")
 
 
-def test_every_lesson_is_a_notebook_that_marimo_has_nothing_to_say_about():
+def test_marimo_accepts_every_lesson():
     lessons = sorted(NOTEBOOKS.glob("*.py"))
     assert [path.stem.split("_")[1] for path in lessons] == ["1", "2"]
     check = [sys.executable, "-m", "marimo", "check", "--strict", *lessons]
@@ -37,7 +37,7 @@ def test_every_lesson_is_a_notebook_that_marimo_has_nothing_to_say_about():
     assert ended.returncode == 0, ended.stdout + ended.stderr
 
 
-def test_a_folded_arm_swings_faster_and_longer_than_a_stretched_one():
+def test_folded_arm_vibrates_faster_and_longer_than_a_stretched_one():
     stretched = lesson("lesson_1_poses", shoulder=-180, elbow=0, wrist=-90)
     folded = lesson("lesson_1_poses", shoulder=-90, elbow=150, wrist=-90)
     assert stretched["here_f"] == pytest.approx(6.7, rel=0.05)
@@ -50,13 +50,13 @@ def test_a_folded_arm_swings_faster_and_longer_than_a_stretched_one():
     assert answer["worst"] <= folded["left"].max()
 
 
-def test_the_most_robust_shaper_covers_the_workspace_for_more_than_twice_the_delay():
+def test_most_robust_shaper_has_more_than_twice_the_delay():
     answer = lesson("lesson_1_poses", chosen="ei3", design=12.0)["answer"]
     assert answer["worst"] < 0.1
     assert answer["fixed_ms"] > 2.0 * answer["following_ms"]
 
 
-def test_a_robust_shaper_leaves_less_at_a_wrong_frequency_and_the_mistake_to_be_corrected_is_seen():
+def test_robust_shaper_leaves_less_at_a_wrong_frequency():
     own = lesson("lesson_2_your_shaper")
     remaining, delay = own["answer"]["remaining"], own["answer"]["delay_ms"]
     assert remaining["ei", 0.25] < 0.6 * remaining["zv", 0.25]

@@ -32,7 +32,7 @@ def disc(arm, mass):
     return body(paper_payload(arm, mass))
 
 
-def test_the_inertia_is_the_first_entry_of_the_mass_matrix_wherever_the_shoulder_is(arm):
+def test_inertia_equals_that_of_the_mass_matrix(arm):
     payload = disc(arm, 2.0)
     formula, model = FlexibleShoulder.of(arm, payload), rigid_model(arm, payload)
     for q in np.random.default_rng(0).uniform(-math.pi, math.pi, (20, 2)):
@@ -41,7 +41,7 @@ def test_the_inertia_is_the_first_entry_of_the_mass_matrix_wherever_the_shoulder
 
 
 @pytest.mark.parametrize("mass", MASSES)
-def test_simulated_frequencies_are_within_half_a_percent_of_the_formula(arm, mass):
+def test_simulated_frequencies_agree_with_the_formula(arm, mass):
     """Fitted to the accelerometer, noise and friction included."""
     payload = disc(arm, mass)
     formula = FlexibleShoulder.of(arm, payload)
@@ -49,7 +49,7 @@ def test_simulated_frequencies_are_within_half_a_percent_of_the_formula(arm, mas
         assert pluck(arm, payload, elbow).f_d == pytest.approx(formula.mode(elbow)[0], rel=0.005)
 
 
-def test_the_lowest_true_mode_is_the_formula_s(arm):
+def test_lowest_true_mode_agrees_with_the_formula(arm):
     payload = disc(arm, 1.0)
     formula, plant = FlexibleShoulder.of(arm, payload), FlexibleArm(arm, payload)
     for elbow in ANGLES:
@@ -59,7 +59,7 @@ def test_the_lowest_true_mode_is_the_formula_s(arm):
         assert modes.f_d[1] > 10.0 * f_d
 
 
-def test_the_estimator_for_a_filter_is_the_formula_over_the_whole_range(arm):
+def test_estimator_agrees_with_the_formula(arm):
     formula = FlexibleShoulder.of(arm, disc(arm, 1.0))
     estimator = formula.estimator()
     for elbow in np.linspace(-math.pi, math.pi, 25):
@@ -68,7 +68,7 @@ def test_the_estimator_for_a_filter_is_the_formula_over_the_whole_range(arm):
         assert not estimator.clipped
 
 
-def test_the_calibration_that_ships_is_within_a_percent_of_the_formula(arm):
+def test_shipped_calibration_agrees_with_the_formula(arm):
     calibration = load_calibration("one-joint_1kg")
     formula, estimator = FlexibleShoulder.of(arm, disc(arm, 1.0)), estimator_of(calibration)
     for elbow in np.radians(np.arange(-150.0, 151.0, 10.0)):
@@ -77,21 +77,21 @@ def test_the_calibration_that_ships_is_within_a_percent_of_the_formula(arm):
         assert zeta == pytest.approx(formula.mode(elbow)[1], rel=0.05)
 
 
-def test_arms_whose_axes_are_not_vertical_have_no_such_formula(arm):
+def test_arm_without_vertical_axes_has_no_formula(arm):
     leaning = replace(arm, kinematics=replace(arm.kinematics, alpha=(0.0, 0.1)))
     for other in (leaning, load("ur5e")):
         with pytest.raises(ValueError, match=f"two vertical axes|robot {other.robot.name}"):
             FlexibleShoulder.of(other, other.payload)
 
 
-def test_inertia_falls_and_frequency_rises_over_the_three_angles_of_the_paper(done):
+def test_inertia_falls_and_frequency_rises_over_the_papers_angles(done):
     assert [round(math.degrees(mode.elbow)) for mode in done.poses] == [30, 90, 150]
     first, second, third = done.poses
     assert first.inertia > second.inertia > third.inertia
     assert first.simulated_f_d < second.simulated_f_d < third.simulated_f_d
 
 
-def test_the_page_says_what_was_found(done):
+def test_page_has_the_computed_values(done):
     found = PAGE.read_text(encoding="utf-8")
     for one in done.poses:
         figures = (one.inertia, one.f_d, one.simulated_f_d, one.zeta, one.simulated_zeta)

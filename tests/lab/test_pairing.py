@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from tests.lab.conftest import straight_step
 
-from tvist_lab.change import MotionChange
 from tvist_lab.metrics import MeasuredRecording, pairs
+from tvist_lab.metrics.comparison import MotionChange
 from tvist_lab.report.verdict import verdict_on_pairs
 
 TICKS = 1500
@@ -41,7 +41,7 @@ def many(make_recording, ring):
     return make
 
 
-def test_each_shaped_motion_is_paired_with_the_unshaped_one_of_the_same_way_and_speed(many):
+def test_shaped_motion_is_paired_with_the_unshaped_one_of_equal_path_and_speed(many):
     measured = many(("none", 0, 400, 1.0), ("zv", 37, 400, 0.1), ("zv", 37, 300, 0.1), ("ei", 60, 400, 0.5))
     found = pairs(measured)
     ways = [(one.unshaped, one.shaped, one.shaper, one.name) for one in found]
@@ -54,7 +54,7 @@ def test_each_shaped_motion_is_paired_with_the_unshaped_one_of_the_same_way_and_
     assert alone == "Made only with or only without a shaper: 1 motion of x."
 
 
-def test_repeated_motions_are_paired_in_order_and_each_once(many):
+def test_repeated_motions_are_paired_in_order(many):
     measured = many(
         ("none", 0, 400, 1.0), ("zv", 37, 400, 0.1), ("none", 0, 400, 1.0), ("zv", 37, 400, 0.05), ("zv", 37, 400, 0.1)
     )  # fmt: skip
@@ -65,14 +65,14 @@ def test_repeated_motions_are_paired_in_order_and_each_once(many):
     assert each.startswith("Q1 → Q2: 90 % less, came to rest")
 
 
-def test_what_the_delay_shows_counts_where_no_event_names_the_shaper(many):
+def test_delay_identifies_shaping_without_events(many):
     measured = many(("", 0, 400, 1.0), ("", 37, 400, 0.1), named=False)
     (one,) = pairs(measured)
     assert (one.shaper, one.name) == ("", "motions 1 and 2")
     assert pairs(many(("", 0, 400, 1.0), ("", 0, 400, 1.0), named=False)) == []
 
 
-def test_what_does_not_vibrate_or_gets_worse_is_said(many):
+def test_motions_without_vibration_or_with_more_are_reported(many):
     worse = many(("none", 0, 400, 0.2), ("zv", 37, 400, 0.3))
     assert "50 % more vibration" in verdict_on_pairs(pairs(worse), worse.results, "x")[0]
     quiet = many(("none", 0, 400, 0.1), ("zv", 37, 400, 0.02))

@@ -40,7 +40,7 @@ def said(watch, kind="text"):
     return [one.text for one in watch.said if one.kind == kind]
 
 
-def test_a_program_that_ends_by_itself_is_finished_after_its_robot_time():
+def test_program_that_ends_is_finished():
     watch = run("sleep(0.3)", 'textmsg("slept")', "sleep(0.2)")
     assert (watch.name, watch.reason, watch.why) == ("prog", "finished", None)
     assert watch.seconds == pytest.approx(0.5)
@@ -59,7 +59,7 @@ def test_a_program_that_ends_by_itself_is_finished_after_its_robot_time():
         (["while True:", "sync()", "end"], {"timeout": 0.4}, "timeout", "after 0.4 s of robot time", []),
     ],
 )  # fmt: skip
-def test_a_run_says_how_and_why_it_ended(lines, how, reason, why, told):
+def test_run_reports_how_and_why_it_ended(lines, how, reason, why, told):
     watch = run(*lines, **how)
     assert (watch.reason, why in (watch.why or "")) == (reason, True)
     assert watch.seconds == pytest.approx(how.get("timeout", watch.seconds))
@@ -67,7 +67,7 @@ def test_a_run_says_how_and_why_it_ended(lines, how, reason, why, told):
     assert all(words in text for words, text in zip(told, heard, strict=True))
 
 
-def test_an_error_has_its_place():
+def test_error_has_line_and_column():
     watch = run("x = [1, 2]", "sleep(0.1)", "y = x[2]")
     assert (watch.reason, watch.error.line, watch.error.column) == ("runtime_error", 4, 9)
     assert "2" in watch.error.text
@@ -75,14 +75,14 @@ def test_an_error_has_its_place():
     assert said(watch, "warning") == []
 
 
-def test_popups_are_told_and_do_not_hold_up_the_program():
+def test_popups_are_reported_and_do_not_block_the_program():
     watch = run('popup("part?", title="Ask", error=True, blocking=True)', 'textmsg("on")')
     assert [(one.kind, one.text, one.title, one.level) for one in watch.said] == [
         ("popup", "part?", "Ask", "error"), ("text", "on", None, None),
     ]  # fmt: skip
 
 
-def test_inputs_are_there_from_the_first_tick():
+def test_inputs_are_set_from_the_first_tick():
     watch = run(
         "textmsg(read_input_integer_register(3))",
         "textmsg(read_input_float_register(0))",
@@ -108,13 +108,13 @@ def test_inputs_are_there_from_the_first_tick():
         ("digital_input_18=1", "0 to 17"),
     ],
 )
-def test_a_wrong_input_names_the_input_and_what_is_allowed(wrong, word):
+def test_wrong_input_is_refused(wrong, word):
     with pytest.raises(InputError, match=word) as refused:
         run("sleep(0.1)", inputs=(wrong,))
     assert repr(wrong) in str(refused.value)
 
 
-def test_moves_have_their_durations_and_say_when_something_else_stopped_them():
+def test_moves_have_durations_and_are_marked_if_stopped():
     watch = run(*MOVES, "speedj([0.2, 0, 0, 0, 0, 0], 2, 0.3)")
     planned = watch.moves[:3]
     assert len(watch.moves) == 4
@@ -125,20 +125,20 @@ def test_moves_have_their_durations_and_say_when_something_else_stopped_them():
     assert watch.tick >= watch.moves[-1].ended + 150  # until the arm rests
 
 
-def test_a_stop_that_the_next_move_follows_at_once_shakes_as_it_would_at_rest():
+def test_stop_without_rest_has_the_peak_predicted_at_rest():
     quick, slow = (run(*MOVES[:3], *pause, *MOVES[3:], payload=5.0) for pause in ((), ("sleep(0.5)",)))
     assert quick.moves[1].rested < 50 < slow.moves[1].rested
     assert quick.moves[1].peak == pytest.approx(slow.moves[1].peak, rel=0.005)
     assert quick.moves[2].peak != pytest.approx(slow.moves[2].peak, rel=1e-6)  # it began while the tool shook
 
 
-def test_so_does_a_stop_before_a_motion_that_begins_with_a_jolt():
+def test_stop_before_an_abrupt_motion_has_the_peak_predicted_at_rest():
     jolt, rest = "speedj([0.2, 0, 0, 0, 0, 0], 2, 0.3)", "sleep(0.5)"
     quick, slow = (run(MOVES[0], *pause, jolt, payload=5.0, shaper="auto") for pause in ((), (rest,)))
     assert quick.moves[0].peak == pytest.approx(slow.moves[0].peak, abs=0.003)
 
 
-def test_moves_and_warnings_have_the_lines_of_the_program():
+def test_moves_and_warnings_have_program_lines():
     up = "movel(pose_trans(get_target_tcp_pose(), p[0, 0, 0.1, 0, 0, 0]), a=30, v=9)"
     watch = run("sleep(0.1)", up, MOVES[0])
     assert [move.line for move in watch.moves] == [3, 4]
@@ -146,13 +146,13 @@ def test_moves_and_warnings_have_the_lines_of_the_program():
     assert watch.fastest_joint.line in {3, 4}
 
 
-def test_shaping_lets_the_tool_shake_less():
+def test_shaping_reduces_the_peak():
     unshaped = largest_peak(run(*MOVES, payload=5.0))
     shaped = largest_peak(run(*MOVES, payload=5.0, shaper="auto"))
     assert shaped < 0.5 * unshaped
 
 
-def test_the_peak_is_that_of_the_recorded_truth(tmp_path):
+def test_peak_equals_that_of_the_recorded_truth(tmp_path):
     path = tmp_path / "run.mcap"
     watch = run(*MOVES, payload=5.0, record=path)
     recording = read(path).recording
@@ -163,7 +163,7 @@ def test_the_peak_is_that_of_the_recorded_truth(tmp_path):
     assert [motion.stopped for motion in motions(recording)] == [False] * 3
 
 
-def test_a_recording_replays_to_the_last_bit(tmp_path):
+def test_recording_of_a_program_replays_exactly(tmp_path):
     path = tmp_path / "run.mcap"
     run(*MOVES, 'popup("on?", blocking=True)', inputs=("digital_input_1=1",), record=path)
     again = replay_file(read(path))
@@ -171,13 +171,13 @@ def test_a_recording_replays_to_the_last_bit(tmp_path):
     assert [event.kind for event in again.events] == [event.kind for event in read(path).events]
 
 
-def test_a_program_that_is_refused_leaves_no_recording(tmp_path):
+def test_refused_program_leaves_no_recording(tmp_path):
     with pytest.raises(RefusedError, match="script_error"):
         run("nope()", record=tmp_path / "run.mcap")
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_report_tells_everything():
+def test_result_as_values_is_complete():
     watch = run('textmsg("a")', 'popup("b", title="c")', *MOVES[:2], "y = 1 / 0")
     told = as_dict(watch)
     assert (told["ok"], told["exit_reason"], told["program"]) == (False, "runtime_error", "prog")
@@ -196,7 +196,7 @@ def test_the_report_tells_everything():
     assert tool["line"] == joint["line"] == 4
 
 
-def test_arms_that_give_the_tick_or_are_none_are_refused_and_without_truth_nobody_knows_the_shake():
+def test_pacing_plant_is_refused_and_without_truth_there_is_no_peak():
     watch = run(MOVES[0], plant=OwnPlant("mine.py:NoArm", "", lambda *_: NoArm()), truth=False)
     assert (watch.reason, len(watch.moves), largest_peak(watch)) == ("finished", 1, None)
     with pytest.raises(StartError, match="the plant OwnArm gives the tick"):
@@ -205,7 +205,7 @@ def test_arms_that_give_the_tick_or_are_none_are_refused_and_without_truth_nobod
         run(MOVES[0], plant=OwnPlant("mine.py:nothing", "", lambda *_: None), truth=False)
 
 
-def test_the_recording_begins_where_an_arm_stands(tmp_path):
+def test_recording_starts_at_the_pose_of_the_arm(tmp_path):
     class Stands(OwnArm):
         wait = None  # it does not give the tick
 
@@ -249,11 +249,11 @@ def texts(found):
 
 
 class TestLimits:
-    def test_those_that_are_kept_say_nothing(self, watch):
+    def test_kept_limits_give_no_failure(self, watch):
         assert texts(broken(limits(10.0, 100.0, 3.2, 5.0), watch)) == []
         assert texts(broken(RunLimits(), watch)) == []
 
-    def test_each_that_is_broken_says_where_and_when(self, watch):
+    def test_broken_limit_is_reported_with_line_and_time(self, watch):
         found = list(broken(limits(0.3, 1.0, 0.5, 0.1), watch))
         kinds = ["max_seconds", *["max_shake"] * 3, "max_joint_speed", "max_tool_speed"]
         assert [one.kind for one in found] == kinds
@@ -264,14 +264,14 @@ class TestLimits:
         assert found[4].text.startswith("joint base turned with ")
         assert found[5].text.startswith("the tool moved with ")
 
-    def test_a_shake_that_nobody_knows_breaks_its_limit(self):
+    def test_unknown_peak_breaks_its_limit(self):
         mute = run(MOVES[0], plant=OwnPlant("mine.py:NoArm", "", lambda *_: NoArm()), truth=False)
         (found,) = broken(RunLimits(max_shake=5.0), mute)
         assert (found.line, "not known" in found.text) == (2, True)
 
 
 class TestBaseline:
-    def test_the_same_run_has_not_changed(self, result, tmp_path):
+    def test_same_run_equals_its_baseline(self, result, tmp_path):
         path = kept(tmp_path / "base.json", json.loads(json.dumps(result)))
         before = read_baseline(path, ["a.script"])["a.script"]
         assert texts(changes(before, result)) == []
@@ -291,20 +291,20 @@ class TestBaseline:
             (lambda one: one["warnings"].append({"text": "hot"}), "new warning: hot"),
         ],
     )  # fmt: skip
-    def test_each_change_is_a_sentence(self, result, tmp_path, change, said):
+    def test_each_difference_from_the_baseline_is_reported(self, result, tmp_path, change, said):
         before = read_baseline(kept(tmp_path / "base.json", result), ["a.script"])["a.script"]
         change(now := deepcopy(result))
         (found,) = texts(changes(before, now))
         assert said in found
 
-    def test_a_warning_that_is_gone_and_an_error_that_is_new_are_told(self, result, tmp_path):
+    def test_missing_warning_and_new_error_are_reported(self, result, tmp_path):
         result["warnings"] = [{"text": "hot"}]
         before = read_baseline(kept(tmp_path / "base.json", result), ["a.script"])["a.script"]
         assert texts(changes(before, {**result, "warnings": []})) == ["no longer warned: hot"]
         uncompiled = {**UNCOMPILED, "file": "a.script"}
         assert texts(changes(before, uncompiled)) == ["exit_reason is compile_error, before finished"]
 
-    def test_it_may_have_several_programs_in_any_order(self, result, tmp_path):
+    def test_baseline_may_have_programs_in_any_order(self, result, tmp_path):
         found = read_baseline(kept(tmp_path / "b.json", UNCOMPILED, result), ["a.script", "wrong.script"])
         assert found["a.script"]["seconds"] == result["seconds"]
         assert found["wrong.script"]["exit_reason"] == "compile_error"
@@ -316,20 +316,20 @@ class TestBaseline:
             ("[1]", "is not what tvist run"),
             ('{"programs": 3}', "is not what tvist run"),
             ('{"file": "a.script", "exit_reason": "compile_error", "lockstep": false}', "in real time"),
-            ('{"file": "b.script", "exit_reason": "compile_error"}', "is of b.script, and this run is of a"),
+            ('{"file": "b.script", "exit_reason": "compile_error"}', "is of b.script, this run is of a"),
             ('{"file": "a.script", "exit_reason": "compile_error", "warnings": "x"}', "is not what tvist run"),
             ('{"programs": []}', "is of nothing"),
             ("[" * 100_000, "is not what tvist run"),
         ],
     )  # fmt: skip
-    def test_another_shape_is_refused_in_a_sentence(self, tmp_path, content, word):
+    def test_wrong_baseline_is_refused(self, tmp_path, content, word):
         (tmp_path / "base.json").write_text(content, encoding="utf-8")
         with pytest.raises(BaselineError, match=word) as refused:
             read_baseline(tmp_path / "base.json", ["a.script"])
         assert "base.json" in str(refused.value)
 
 
-def test_junit_has_a_case_for_each_program_with_measures_and_sentences(result):
+def test_junit_has_a_case_per_program_with_properties(result):
     shook = {"kind": "max_shake", "line": 3, "text": "shook"}
     result["failures"] = [shook, {"kind": "baseline", "line": None, "text": "x"}]
     result |= {"ok": False, "warnings": [{"timestamp": 0.1, "line": 4, "text": "slow\ufffe"}]}

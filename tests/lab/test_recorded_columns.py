@@ -33,7 +33,7 @@ def _block(request, monkeypatch):
 
 
 @pytest.mark.parametrize("name", ["faults", "live_lost_lease"])
-def test_the_columns_of_real_recordings(name):
+def test_columns_of_real_recordings(name):
     assert equals_objects(read(JOURNALS / f"{name}.mcap"))
 
 
@@ -56,7 +56,7 @@ def random_messages(seed):
             yield changed(TRUTH, tick=tick, motor_q=some(), **short)
 
 
-def test_the_columns_of_random_messages(tmp_path):
+def test_columns_of_random_messages(tmp_path):
     for seed in range(5):
         content = read(record(tmp_path / "run.mcap", random_messages(seed)))
         assert content.complete
@@ -92,7 +92,7 @@ def written(path, states):
     return read(foreign(path, [(topic, msgspec.json.encode(message)) for topic, message in messages]))
 
 
-def test_a_field_that_an_earlier_version_did_not_write_has_its_default(tmp_path):
+def test_field_missing_in_an_earlier_version_has_its_default(tmp_path):
     states = [msgspec.to_builtins(changed(STATE, tick=tick)) for tick in range(10)]
     for state in states[:9]:
         del state["shaper_clipped"], state["motor_limited"]
@@ -103,7 +103,7 @@ def test_a_field_that_an_earlier_version_did_not_write_has_its_default(tmp_path)
     assert equals_objects(content)
 
 
-def test_events_before_an_invalid_state_are_kept_and_later_ones_are_not(tmp_path):
+def test_events_before_an_invalid_state_are_kept(tmp_path):
     states = [msgspec.to_builtins(changed(STATE, tick=tick)) for tick in range(20)]
     states[12]["tick"] = "a"
     content = written(tmp_path / "run.mcap", states)
@@ -111,7 +111,7 @@ def test_events_before_an_invalid_state_are_kept_and_later_ones_are_not(tmp_path
     assert "contains an invalid message" in content.note
 
 
-def test_a_file_that_is_gone_or_shorter_when_its_states_are_asked_for_is_told(tmp_path):
+def test_file_that_changed_since_it_was_read_is_refused(tmp_path):
     path = record(tmp_path / "run.mcap", random_messages(0))
     content = read(path)
     path.write_bytes(path.read_bytes()[:1500])
@@ -122,7 +122,7 @@ def test_a_file_that_is_gone_or_shorter_when_its_states_are_asked_for_is_told(tm
         _ = content.truths
 
 
-def test_states_added_while_it_is_read_do_not_appear(tmp_path):
+def test_states_appended_during_reading_are_ignored(tmp_path):
     messages = [changed(STATE, tick=tick) for tick in range(500)]
     path = record(tmp_path / "run.mcap", messages[:300])
     content = read(path)

@@ -36,7 +36,7 @@ def recordings_verdict(paths):
     return of_recordings._verdict(base, compared)
 
 
-def test_less_vibration_is_said_with_its_figures_and_that_it_was_shaped(tmp_path):
+def test_verdict_reports_less_vibration_by_shaping(tmp_path):
     before, after = (
         log(tmp_path, "b.csv", LOUD, shaped_by=0.0),
         log(tmp_path, "a.csv", QUIET, shaped_by=0.05, seed=2),
@@ -47,7 +47,7 @@ def test_less_vibration_is_said_with_its_figures_and_that_it_was_shaped(tmp_path
     assert re.fullmatch(r"a.csv was shaped: its target ends (4[6-9]|50) ms after its reference.", verdict[2])
 
 
-def test_an_unshaped_run_that_is_called_shaped_is_found_out_and_shaping_gets_no_credit(tmp_path):
+def test_unshaped_run_gives_shaping_no_credit(tmp_path):
     loud = log(tmp_path, "unshaped.csv", LOUD, shaped_by=0.0)
     other = log(tmp_path, "shaped.csv", LOUD, shaped_by=0.0, seed=2)
     verdict = recordings_verdict([loud, other])
@@ -58,7 +58,7 @@ def test_an_unshaped_run_that_is_called_shaped_is_found_out_and_shaping_gets_no_
     assert "So shaping is not the reason why b.csv vibrates less." in recordings_verdict([loud, quiet])
 
 
-def test_more_vibration_none_at_all_and_no_common_motion_are_said(tmp_path):
+def test_verdict_reports_more_vibration_none_and_no_common_motion(tmp_path):
     quiet, loud = log(tmp_path, "quiet.csv", QUIET), log(tmp_path, "loud.csv", LOUD, seed=2)
     assert re.match(r"loud.csv vibrates \d+ % more", recordings_verdict([quiet, loud])[0])
     still = [log(tmp_path, f"{n}.csv", ((9.0, 0.1, 0.02),), seed=n) for n in (3, 4)]
@@ -68,7 +68,7 @@ def test_more_vibration_none_at_all_and_no_common_motion_are_said(tmp_path):
     assert recordings_verdict([quiet, other])[0] == nothing
 
 
-def test_what_was_not_measured_decides_nothing():
+def test_unmeasured_values_do_not_affect_the_verdict():
     unknown = MotionResult(start_s=0.0, stop_s=1.0)
     assert shaping_of([unknown], "x").shaped is None
     assert "no vibration could be measured" in verdict_on_one([unknown], "x")[0]
@@ -95,7 +95,7 @@ def page(files):
     return render(recordings_page(files, "tvist log report"))
 
 
-def test_the_page_is_valid_and_small_and_loads_nothing(page):
+def test_page_is_valid_small_and_self_contained(page):
     html5lib.HTMLParser(strict=True).parse(page)
     assert len(page.encode()) < 5e6
     for address in re.findall(r'(?:src|href)="([^"]*)"', page):
@@ -108,16 +108,16 @@ def test_the_page_is_valid_and_small_and_loads_nothing(page):
     assert r"100% $\frac{$.csv" in page
 
 
-def test_the_same_files_give_the_same_page(files, page):
+def test_same_files_give_the_same_page(files, page):
     assert render(recordings_page(files, "tvist log report")) == page
 
 
-def test_a_file_that_is_no_recording_is_refused(tmp_path):
+def test_file_that_is_no_recording_is_refused(tmp_path):
     (tmp_path / "notes.txt").write_text("nothing\n")
     with pytest.raises(RecordingError, match=r"notes.txt"):
         recordings_page([tmp_path / "notes.txt"], "")
 
 
-def test_a_page_is_written_although_a_file_has_a_name_that_is_no_text(tmp_path):
+def test_page_is_written_for_a_file_name_that_is_no_text(tmp_path):
     write_report(tmp_path / "r.html", ReportPage("bad\udcff.mcap", ["It shook."], []))
     assert "bad?.mcap" in (tmp_path / "r.html").read_text(encoding="utf-8")

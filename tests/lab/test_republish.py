@@ -58,7 +58,7 @@ def network(monkeypatch):
     return made
 
 
-def test_all_that_the_robot_published_is_published_in_its_order(path, network):
+def test_all_messages_are_published_in_order(path, network):
     playback = Playback(read(path), ["tcp/127.0.0.1:1"], speed=100.0)
     asyncio.run(playback.run())
     assert [message for _, message in network.told] == MESSAGES
@@ -66,14 +66,14 @@ def test_all_that_the_robot_published_is_published_in_its_order(path, network):
     assert (playback.states, network.robot, network.closed) == (3, INFO.name, True)
 
 
-def test_in_a_loop_ticks_and_times_go_on(path):
+def test_ticks_and_times_continue_in_a_loop(path):
     messages = list(islice(played(read(path), loop=True), 13))
     assert [message.tick for message in messages] == [4, 4, 5, 6, 6, 6, 7, 7, 8, 9, 9, 9, 10]
     times = [message.timestamp for message in messages if isinstance(message, State)]
     assert times == pytest.approx([0.008, 0.010, 0.012, 0.014, 0.016, 0.018])
 
 
-def test_its_time_is_that_of_the_recording(path, network, monkeypatch):
+def test_playback_has_the_timing_of_the_recording(path, network, monkeypatch):
     waited = []
 
     async def sleep(seconds):
@@ -99,7 +99,7 @@ def test_info_has_the_name_and_the_present_tick(path, network):
 
 
 @pytest.mark.parametrize("data", [encode(TakeControl(client="a")), b"nonsense"])
-def test_commands_are_refused(data):
+def test_playback_refuses_commands(data):
     desk, answers = PlaybackDesk(INFO, "ghost"), []
     desk.request(data, answers.append)
     (refused,) = answers
@@ -109,7 +109,7 @@ def test_commands_are_refused(data):
     assert desk.holder() is None
 
 
-def test_a_recording_that_does_not_describe_its_robot_is_refused(path):
+def test_recording_without_description_is_refused(path):
     content = read(path)
     object.__setattr__(content, "info", None)
     with pytest.raises(RecordingError, match=r"run\.mcap does not describe its robot"):
@@ -126,7 +126,7 @@ def test_a_recording_that_does_not_describe_its_robot_is_refused(path):
         ({"publish": True, "output": "a.mcap"}, "leave out the output"),
     ],
 )
-def test_options_that_do_not_go_together_are_refused(path, options, says):
+def test_incompatible_options_are_refused(path, options, says):
     with pytest.raises(Failure, match=says) as failure:
         replay(path, **options)
     assert failure.value.code == 2

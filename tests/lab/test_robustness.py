@@ -40,7 +40,7 @@ def rows(made):
     return made.frame([row for job in made.jobs() for row in measure(job)])
 
 
-def test_an_error_of_nothing_is_the_same_whatever_it_is_of_and_a_large_one_costs_reduction(made, rows):
+def test_large_frequency_error_costs_reduction(made, rows):
     values = made.result(rows, {}).values
     found = {
         kind: {(one["shaper"], one["error"]): one for one in those} for kind, those in cells(values).items()
@@ -53,7 +53,7 @@ def test_an_error_of_nothing_is_the_same_whatever_it_is_of_and_a_large_one_costs
     assert wrong["reduction_percent_median"] < right["reduction_percent_median"]
 
 
-def test_the_report_is_ordered_by_delay_and_names_what_does_not_count(made, rows):
+def test_report_is_ordered_by_delay_and_lists_omissions(made, rows):
     result = made.result(rows, {})
     assert [one["shaper"] for one in result.values["summary"]] == ["elastic", "zv_3_modes_frozen_at_end"]
     first = cells(result.values)["stiffness"][0]
@@ -71,13 +71,13 @@ def test_the_report_is_ordered_by_delay_and_names_what_does_not_count(made, rows
     assert len(study_figures(result)["robustness"][0].axes) == len(ERRORS)
 
 
-def test_a_hidden_robot_is_one_more_plant_whose_seed_stands_in_its_name(ur5e):
+def test_hidden_robot_is_a_plant_with_its_seed_in_its_name(ur5e):
     assert list(errors([hidden_variant(7)])[PLANT]) == [*PERTURBED, "hidden-7"]
     wanted = study(asked(ur5e, "zv", arms=[hidden_variant(7)]))
     assert "hidden-7" in {one.name for case in wanted.cases for one in case.arms}
 
 
-def test_few_moves_have_no_5th_percentile_and_no_published_seed_is_for_tuning():
+def test_few_moves_give_no_5th_percentile_and_seeds_are_held_out():
     values = pl.DataFrame({"x": [float(one) for one in range(MIN_MOVES)]})
     assert values.select(p5("x", MIN_MOVES)).item() == pytest.approx(0.95)
     assert values[1:].select(p5("x", MIN_MOVES)).item() is None
@@ -85,7 +85,7 @@ def test_few_moves_have_no_5th_percentile_and_no_published_seed_is_for_tuning():
     assert "Nothing is tuned on seed 20261123" in said(JUDGING["robustness"])
 
 
-def test_the_smoothing_of_elastic_alone_is_its_reference_without_its_feed_forward(ur5e):
+def test_smoothing_alone_is_elastic_without_feed_forward(ur5e):
     wanted = asked(ur5e, "smoothing", "elastic")
     task = Task(ur5e, wanted.moves[0], Case(ur5e, wanted.moves[0]).reference())
     alone, elastic = (method.shaped(task) for method in wanted.methods)

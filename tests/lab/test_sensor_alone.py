@@ -55,7 +55,7 @@ def test_frequency_and_damping_of_ring_downs_and_sweeps_are_found(
             assert one.f_d_interval_hz[0] < one.f_d_hz < one.f_d_interval_hz[1]
 
 
-def test_what_does_not_ring_freely_is_not_measured(tmp_path):
+def test_forced_vibration_is_not_measured(tmp_path):
     t = np.arange(0.0, 6.0, 0.002)
     driven = np.where((t > 1.0) & (t < 2.0), np.sin(2.0 * np.pi * (t - 1.0)), 0.0)
     hum = np.where(t > 1.0, 0.5 * np.sin(2.0 * np.pi * 50.0 * t), 0.0)
@@ -65,7 +65,7 @@ def test_what_does_not_ring_freely_is_not_measured(tmp_path):
             free_vibrations(recording)
 
 
-def test_the_commands_say_that_it_is_an_accelerometer_alone(tmp_path, capsys):
+def test_commands_report_an_accelerometer_alone(tmp_path, capsys):
     file = klipper(tmp_path / "raw.csv", 1600, ringing(1600, 41.0, 0.04))
     analyze(file)
     assert "an accelerometer alone" in capsys.readouterr().out

@@ -40,7 +40,7 @@ def moves(lag=LAG, gain=GAIN, delay=DELAY, every=1):
 
 
 @pytest.mark.parametrize(("lag", "gain", "every"), [(LAG, GAIN, 1), (0.1, 320.0, 4)])
-def test_lag_gain_and_delay_are_found_also_from_every_fourth_row(lag, gain, every):
+def test_lag_gain_and_delay_are_found_from_every_fourth_row(lag, gain, every):
     found = servo_response(moves(lag, gain, every=every))
     assert found.lag == pytest.approx(lag, rel=0.02)
     assert found.gain == pytest.approx(gain, rel=0.05)
@@ -49,7 +49,7 @@ def test_lag_gain_and_delay_are_found_also_from_every_fourth_row(lag, gain, ever
         assert pole**2 + gain * lag * pole + gain == pytest.approx(0.0, abs=0.05 * gain)
 
 
-def test_an_arm_that_does_not_follow_as_a_servo_does_has_no_lag_and_repeated_rows_do_not_count():
+def test_arm_that_does_not_follow_like_a_servo_has_no_lag():
     wrong = [
         replace(move, columns={**move.columns, "actual_q": np.round(move["actual_q"], 1)}) for move in moves()
     ]

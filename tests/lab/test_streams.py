@@ -70,7 +70,7 @@ def made(name, mass):
     return SteadyFilter(ProductDesign(longest), recipe.estimator(UR5E, mass, 3), joints=UR5E.joints)
 
 
-def test_a_filter_that_could_be_told_the_end_follows_the_arm_where_nobody_tells_it():
+def test_filter_without_a_target_follows_a_stream():
     tvist = made("auto-target", 5.0)
     before = tvist.estimator.estimate(np.zeros(6))[0][0]
     stream = retargeted(4.0, 3, wrists=False)
@@ -83,7 +83,7 @@ def test_a_filter_that_could_be_told_the_end_follows_the_arm_where_nobody_tells_
 @pytest.mark.parametrize(
     ("name", "most"), [("auto", 1.011), ("short", 1.009), ("auto-target", 1.009), ("product", 1.004)]
 )
-def test_a_quarter_of_an_hour_of_streams_keeps_velocity_and_all_but_a_hundredth_of_acceleration(name, most):
+def test_long_streams_keep_velocity_and_99_percent_of_acceleration(name, most):
     """What is left is half the second derivative of the delays' variance; independent joints make the most of it."""
     for number, mass in enumerate(MASSES):
         for together in (False, True):

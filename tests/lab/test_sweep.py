@@ -78,10 +78,6 @@ def run(study, folder, runner):
         return run_study(study, folder, nullcontext)
 
 
-def in_processes(study, folder):
-    return run_study(study, folder, lambda: processes(2))
-
-
 @pytest.fixture
 def tasks(tmp_path):
     return tasks_of(tmp_path)
@@ -93,14 +89,14 @@ def whole(tmp_path, tasks):
     return run(tasks, tmp_path / "whole", Quick()).rows
 
 
-def test_a_key_that_is_left_out_has_a_default(tmp_path):
+def test_missing_key_has_a_default(tmp_path):
     spec = tasks_of(tmp_path, "shapers = ['zv']\nmoves = 1\npayloads = [5]").cases.spec
     assert (spec.robots, spec.seed, spec.modes, spec.limits) == (("ur5e",), 0, 1, "gentle")
     assert (spec.stroke, spec.wrists, spec.streams) == ((0.3, 1.0), False, False)
 
 
 class TestTasks:
-    def test_rows_are_to_the_bit_what_any_study_measures(self, tasks):
+    def test_rows_equal_those_of_any_study(self, tasks):
         (task,) = tasks.jobs([11])
         ur5e = load("ur5e")
         move = draw_moves(ur5e, 3, 4, (0.0, ur5e.limits.payload)).moves[2]
@@ -113,17 +109,17 @@ class TestTasks:
         assert {name: zv[name] for name in one} == one
         assert zv["unshaped_peak_m_s2"] == none["shaped_peak_m_s2"]
 
-    def test_a_position_has_the_same_bits_whatever_was_done_before(self, tmp_path, tasks):
+    def test_position_does_not_depend_on_earlier_ones(self, tmp_path, tasks):
         again = tasks_of(tmp_path)
         later = [*map(measure_each, again.jobs([5, 2]))]
         assert [*map(measure_each, tasks.jobs([2, 5]))] == later[::-1]
 
-    def test_moves_and_arms_are_the_same_for_all_payloads_and_errors(self, tasks):
+    def test_all_payloads_and_errors_have_the_same_moves_and_arms(self, tasks):
         same = [*tasks.jobs()][1::3]
         assert len({(one.case.move.start, one.case.move.target, one.case.seed) for one in same}) == 1
         assert [one.case.axes["payload"] for one in same] == ["1.5", "1.5", "uniform", "uniform"]
 
-    def test_a_shaper_that_fails_costs_its_own_row(self, tasks):
+    def test_failed_shaper_loses_only_its_row(self, tasks):
         task = next(tasks.jobs())
         broken = Recipe("zv", None)
         none, zv = measure_each(replace(task, methods=(task.methods[0], Named(broken, "zv"))))
@@ -131,7 +127,7 @@ class TestTasks:
         assert zv["status"] == "failed"
         assert "needs a calibration" in zv["error"]
 
-    def test_a_move_for_which_the_drives_are_too_weak_says_so(self, tmp_path):
+    def test_move_beyond_the_torque_is_marked(self, tmp_path):
         text = SPEC.replace("1.5", "60").replace("moves = 3", "moves = 1") + "limits = 'industrial'"
         rows = measure_each(next(tasks_of(tmp_path, text).jobs()))
         assert {row["status"] for row in rows} == {"too weak"}
@@ -139,7 +135,7 @@ class TestTasks:
 
 
 class TestResuming:
-    def test_an_interrupted_run_continues_with_what_is_missing_and_ends_alike(self, tmp_path, tasks, whole):
+    def test_interrupted_run_continues_with_missing_rows(self, tmp_path, tasks, whole):
         first, second = Quick(order=lambda places: list(places)[::-1], stop=5), Quick()
         with pytest.raises(KeyboardInterrupt):
             run(tasks, tmp_path / "x", first)
@@ -152,7 +148,7 @@ class TestResuming:
         assert run(tasks, tmp_path / "x", ended).resumed == 12
         assert ended.asked == []
 
-    def test_a_part_at_each_so_many_tasks_survives_a_kill(self, tmp_path, tasks, whole, monkeypatch):
+    def test_saved_rows_survive_a_kill(self, tmp_path, tasks, whole, monkeypatch):
         monkeypatch.setattr("tvist_lab.study.engine.PART", 2)
         with pytest.raises(KeyboardInterrupt):
             run(tasks, tmp_path / "x", Quick(stop=7))
@@ -161,7 +157,7 @@ class TestResuming:
         assert_frame_equal(run(tasks, tmp_path / "x", second).rows, whole)
         assert second.asked == list(range(6, 12))
 
-    def test_what_failed_is_named_and_tried_again(self, tmp_path, tasks, whole):
+    def test_failed_rows_are_reported_and_repeated(self, tmp_path, tasks, whole):
         rows = run(tasks, tmp_path / "x", Quick(fail={3})).rows
         bad = rows.filter(pl.col("status") == "failed")
         assert bad["move"].to_list() == [1, 1]
@@ -175,7 +171,7 @@ class TestResuming:
         ("old", "new", "what"), [("seed = 4", "seed = 5", "seed"), ('"none", ', "", "shapers")]
     )
     @pytest.mark.usefixtures("whole")
-    def test_another_spec_does_not_continue(self, tmp_path, old, new, what):
+    def test_run_of_another_sweep_is_not_continued(self, tmp_path, old, new, what):
         other = tasks_of(tmp_path, SPEC.replace(old, new))
         with pytest.raises(
             StoreError, match=rf"whole holds a study with other {what}.*: give another --output"
@@ -183,7 +179,7 @@ class TestResuming:
             run(other, tmp_path / "whole", Quick())
 
     @pytest.mark.usefixtures("whole")
-    def test_a_changed_robot_does_not_continue(self, tmp_path, tasks):
+    def test_run_of_a_changed_robot_is_not_continued(self, tmp_path, tasks):
         robot = tasks.cases.robots[0]
         other = SweptRobot(robot.name, robot.description.clean(), robot.recipes)
         with pytest.raises(StoreError, match="other contents of robots"):
@@ -191,25 +187,23 @@ class TestResuming:
 
 
 class TestFolder:
-    def test_a_folder_with_something_else_is_left_alone(self, tmp_path, tasks):
+    def test_other_folder_is_refused(self, tmp_path, tasks):
         (tmp_path / "x").mkdir()
         (tmp_path / "x" / "thesis.tex").touch()
-        with pytest.raises(StoreError, match="x exists already and holds no study"):
+        with pytest.raises(StoreError, match="x exists and is no folder of a study"):
             run(tasks, tmp_path / "x", Quick())
         assert [file.name for file in (tmp_path / "x").iterdir()] == ["thesis.tex"]
 
-    def test_two_studies_cannot_write_one_folder_and_one_that_kept_nothing_does_not_reserve_it(
-        self, tmp_path, tasks
-    ):
+    def test_folder_in_use_is_refused(self, tmp_path, tasks):
         with (
             Store(tmp_path / "x", {"moves": 1}, tasks.schema),
-            pytest.raises(StoreError, match=r"another study is writing .*x"),
+            pytest.raises(StoreError, match=r"x is in use by another study"),
         ):
             Store(tmp_path / "x", {"moves": 1}, tasks.schema)
         with Store(tmp_path / "x", {"moves": 2}, tasks.schema) as store:
             assert store.rows().is_empty()
 
-    def test_a_full_disk_is_a_sentence_and_leaves_whole_files(self, tmp_path, tasks, whole, monkeypatch):
+    def test_full_disk_is_reported_and_leaves_whole_files(self, tmp_path, tasks, whole, monkeypatch):
         monkeypatch.setattr("tvist_lab.study.engine.PART", 2)
         room = iter(range(4))  # manifest and three parts
 
@@ -226,18 +220,16 @@ class TestFolder:
         assert len(pl.read_parquet(tmp_path / "x" / "parts" / "*.parquet")) == 12
         assert_frame_equal(run(tasks, tmp_path / "x", Quick()).rows, whole)
 
-    def test_a_damaged_part_is_named(self, tmp_path, tasks):
+    def test_damaged_file_of_rows_is_refused(self, tmp_path, tasks):
         with Store(tmp_path / "x", {}, tasks.schema) as store:
             store.keep(tasks.frame(failed(next(tasks.jobs()), "failed", "x")))
             (tmp_path / "x" / "parts" / "000001.parquet").write_bytes(b"PAR1")
-            with pytest.raises(
-                StoreError, match=r"000001\.parquet cannot be read as rows of a study: remove it"
-            ):
+            with pytest.raises(StoreError, match=r"000001\.parquet has no rows of a study: remove it"):
                 store.rows()
 
 
 class TestFigures:
-    def test_the_summary_has_an_entry_for_each_setting_and_shaper(self, tasks, whole):
+    def test_summary_has_an_entry_per_setting_and_shaper(self, tasks, whole):
         entries = tasks.summary(whole)
         assert len(entries) == 8
         assert [entry["rows"] for entry in entries] == [3] * 8
@@ -248,7 +240,7 @@ class TestFigures:
         assert names[3] == "ur5e, uniform, payload +20 %, stiffness ±15 %, frequency -5 %"
 
 
-def test_the_page_has_an_example_and_names_every_key(tmp_path):
+def test_page_has_an_example_and_every_key(tmp_path):
     text = HOW_TO.read_text(encoding="utf-8")
     (example,) = re.findall(r"```toml\n(.*?)```", text, re.DOTALL)
     (tmp_path / "springs.toml").write_text(example, encoding="utf-8")
@@ -265,11 +257,11 @@ def of_the_page():
     return next(text for text in shown if "STUDY" in text)
 
 
-def test_the_study_of_the_page_is_made_kept_and_summarized(tmp_path):
+def test_study_of_the_page_runs(tmp_path):
     text = of_the_page()
     (tmp_path / "speeds.py").write_text(text.replace("20, seed", "1, seed"), encoding="utf-8")
     study = read_study(tmp_path / "speeds.py")
-    ran = in_processes(study, tmp_path / "x")
+    ran = run_study(study, tmp_path / "x", lambda: processes(1))
     assert run(study, tmp_path / "x", Quick()).resumed == 3
     entries = study.summary(ran.rows)
     assert [(one["speed"], one["shaper"]) for one in entries] == [
@@ -306,15 +298,15 @@ def test_the_study_of_the_page_is_made_kept_and_summarized(tmp_path):
         ("x.py", ('"shaped_peak_m_s2")', '"peak")'), ["'peak' is no measure"]),
         ("x.py", ('"zv", "auto"', '"zvv"'), ["there is no method 'zvv', did you mean 'zv'"]),
         ("x.py", ("0.5, 1.0", "1, 'fast'"), ["TypeError"]),
-        ("x.py", ('"move": number', '"status": number'), ["axis 'status' has the name of another column"]),
+        ("x.py", ('"move": number', '"status": number'), ["axis 'status' is the name of another column"]),
         ("x.py", ('"move": number', '"move": number or "0"'), ["'move' has values of the types int, str"]),
         ("x.py", ("1.5 * speed", "-1.5 * speed"), ["velocity limit -0.75: must be a positive number"]),
         ("x.py", ('"unshaped_peak_m_s2", "shaped_peak_m_s2"', ""), ["show is empty"]),
-        ("x.py", ("show=(", 'columns=(Column("x", median("peek")),), show=('), ["needs 'peek', no measure"]),
+        ("x.py", ("show=(", 'columns=(Column("x", median("peek")),), show=('), ["'peek', which is no measure"]),
         ("x.py", ("robot = load", "raise SystemExit(3)\nrobot = load"), ["running it raises SystemExit"]),
     ],
 )  # fmt: skip
-def test_what_is_wrong_with_a_sweep_or_a_study_is_named(tmp_path, file, change, words):
+def test_wrong_sweep_or_study_is_refused(tmp_path, file, change, words):
     study = "from tvist_lab.study.columns import Column, median\n" + of_the_page()
     (tmp_path / file).write_text((SPEC if file == "x.toml" else study).replace(*change), encoding="utf-8")
     kind, read = ("sweep", read_spec) if file == "x.toml" else ("study", read_study)

@@ -23,7 +23,7 @@ async def stopped(robot, arm, *faults, ticks=500):
 
 
 @pytest.mark.parametrize("ticks", [500, 2])
-async def test_a_protective_stop_is_unlocked_also_while_the_arm_still_stops(robot, ticks):
+async def test_protective_stop_is_unlocked_while_the_arm_stops(robot, ticks):
     async with robot.control("me") as arm:
         await arm.move_j([1.0, -3.0, 0.0, -1.57, 0.0, 0.0], wait=False)
         await robot.advance(300)
@@ -32,7 +32,7 @@ async def test_a_protective_stop_is_unlocked_also_while_the_arm_still_stops(robo
         assert (await look(robot)).ready
 
 
-async def test_an_arm_that_carries_too_much_stops_again_and_that_is_said(robot):
+async def test_overloaded_arm_stops_again_with_a_reason(robot):
     async with robot.control("me") as arm:
         await arm.reset(payload=free_setup(payload=20.0, overload=True).payload)
         await stopped(robot, arm)
@@ -45,7 +45,7 @@ async def test_an_arm_that_carries_too_much_stops_again_and_that_is_said(robot):
 
 
 @pytest.mark.parametrize(("fault", "found"), [("violation", "found a violation"), ("fault", "had failed")])
-async def test_the_safety_system_is_restarted_and_the_power_is_offered(robot, fault, found):
+async def test_safety_system_is_restarted_before_power_on(robot, fault, found):
     async with robot.control("me") as arm:
         await stopped(robot, arm, fault)
         (done,) = await make_ready(robot, arm)
@@ -65,7 +65,7 @@ async def test_the_safety_system_is_restarted_and_the_power_is_offered(robot, fa
         (["protective_stop", "safeguard_stop"], "SAFEGUARD_STOP", ["unlocked the protective stop"]),
     ],
 )
-async def test_what_is_not_a_clients_to_release_remains_and_is_said(robot, faults, mode, done):
+async def test_stop_that_a_client_cannot_release_remains(robot, faults, mode, done):
     async with robot.control("me") as arm:
         await stopped(robot, arm, *faults)
         assert await make_ready(robot, arm, power_on=len(faults) == 1) == done
@@ -74,7 +74,7 @@ async def test_what_is_not_a_clients_to_release_remains_and_is_said(robot, fault
         assert "release it" in found.next
 
 
-async def test_a_motion_that_a_safeguard_has_paused_is_not_waited_for(robot):
+async def test_motion_paused_by_a_safeguard_is_not_awaited(robot):
     async with robot.control("me") as arm:
         await arm.move_j([1.0, -3.0, 0.0, -1.57, 0.0, 0.0], wait=False)
         await robot.advance(300)

@@ -57,7 +57,7 @@ def in_one_go(description, recipe, move, seed):
 @pytest.mark.parametrize(
     "name", ["none", "zv", "ei3", "auto", "short", "elastic", "elastic-auto", "the paper's"]
 )
-def test_a_whole_motion_is_what_the_controllers_ticks_are(ur5e, name):
+def test_whole_motion_equals_the_ticks_of_the_controller(ur5e, name):
     names, paper = BUILT_IN.names(), name == "the paper's"
     recipe = Recipe("zv" if paper else name, load_calibration("ur5e_5kg" if paper else "ur5e_modal"))
     number = 5 if paper else names.index(name)
@@ -77,7 +77,7 @@ def commands(description, ticks):
     return np.stack([q, np.gradient(q, PERIOD, axis=0), np.zeros_like(q)], axis=1)
 
 
-def test_an_arm_plays_what_it_steps_with_noise_and_pushes(ur5e):
+def test_played_motion_equals_single_steps(ur5e):
     made = commands(ur5e, 400)
     arms = [FlexibleArm(ur5e, ur5e.payload) for _ in range(2)]
     for arm in arms:
@@ -92,7 +92,7 @@ def test_an_arm_plays_what_it_steps_with_noise_and_pushes(ur5e):
             arm.push(np.array([0.0, 20.0, 0.0, 0.0, 1.0, 0.0]))
 
 
-def test_an_arm_that_fails_says_so(ur5e):
+def test_failure_of_the_arm_is_reported(ur5e):
     made = commands(ur5e, 20)
     arm = FlexibleArm(ur5e, ur5e.payload)
     arm.reset(DriveCommand(made[0, 0], np.zeros(6), np.zeros(6)))

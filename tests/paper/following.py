@@ -24,8 +24,7 @@ from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.plant import GRAVITY
 
 ROBOT, MODAL = load("ur5e"), load_calibration("ur5e_modal")
-SEED = 7_000
-"""First seed of the tables."""
+SEED = 7_000  # first seed of the tables
 
 
 @dataclass(frozen=True)

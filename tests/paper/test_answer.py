@@ -27,7 +27,7 @@ def report(unshaped, shaped, **more):
     }
 
 
-def test_the_answer_comes_first_and_is_short_and_every_word_that_needs_it_is_explained():
+def test_answer_is_short_and_its_terms_are_explained():
     asked = report(method(0.6, 2600.0), method(0.03, 2500.0, 32.0))
     lines = answer(asked, "Q1-Q3")
     assert len(lines) == 4
@@ -47,7 +47,7 @@ def test_the_answer_comes_first_and_is_short_and_every_word_that_needs_it_is_exp
         ((0.5, None, 32.0), "its tool was not at rest when the recording ended"),
     ],
 )
-def test_harm_and_a_tool_that_never_rests_are_said(after, words):
+def test_more_vibration_and_a_tool_that_never_rests_are_reported(after, words):
     said = " ".join(answer(report(method(0.5, 2500.0), method(*after)), "Q1-Q3"))
     assert all(part in said for part in words.split("; "))
 
@@ -60,7 +60,7 @@ def test_harm_and_a_tool_that_never_rests_are_said(after, words):
         ({"recording_gives_same_figures": False}, "different"),
     ],
 )
-def test_what_went_wrong_is_explained_only_if_it_did(fact, word):
+def test_only_actual_problems_are_explained(fact, word):
     pair = method(0.6, 1.0), method(0.1, 1.0)
     usual, other = (checks(report(*pair, **how), None) for how in ({}, fact))
     assert other.keys() - usual.keys() == {word}
@@ -84,7 +84,7 @@ def told(tmp_path, monkeypatch, capsys):
     return tell
 
 
-def test_the_demonstration_ends_with_commands_that_exist(told):
+def test_demonstration_ends_with_existing_commands(told):
     text = told()
     assert "Table" not in text
     *_, rest = text.partition("next:\n")
@@ -95,5 +95,5 @@ def test_the_demonstration_ends_with_commands_that_exist(told):
         check_command(["tvist", *words])
 
 
-def test_programs_get_the_report_alone(told):
+def test_json_contains_the_report_alone(told):
     assert told(json=True).startswith("{")

@@ -27,14 +27,14 @@ def calibration():
 
 
 @pytest.mark.parametrize("name", ["Q1", "Q2", "Q3"])
-def test_it_has_table_1_at_the_papers_poses(calibration, name):
+def test_calibration_gives_table_1_at_the_papers_poses(calibration, name):
     paper = published()["configurations"][name]
     f_d, zeta = estimator_of(calibration).estimate(np.array(paper["q"]))
     assert f_d[0] == pytest.approx(paper["f_d_hz"], rel=0.05)
     assert zeta[0] == pytest.approx(paper["zeta"], rel=0.10)
 
 
-def test_it_is_right_at_the_median_of_random_configurations_it_never_saw(calibration):
+def test_calibration_is_accurate_at_random_configurations(calibration):
     setup = ServeConfig().setup()
     arm = FlexibleArm(setup.description, setup.description.payload)
     estimator = estimator_of(calibration)
@@ -48,14 +48,14 @@ def test_it_is_right_at_the_median_of_random_configurations_it_never_saw(calibra
     assert zeta_error < 0.10
 
 
-def test_it_says_how_it_was_made_and_fits_the_payload_it_was_made_with(calibration):
+def test_calibration_has_its_origin_and_payload(calibration):
     assert calibration.provenance.command.startswith("tvist identify")
     assert calibration.provenance.configurations >= 100
     assert fits(calibration, ServeConfig().setup().payload)
     assert not fits(calibration, ServeConfig(payload=2.0).setup().payload)
 
 
-def test_it_spans_the_frequencies_of_the_workspace(calibration):
+def test_calibration_spans_the_frequencies_of_the_workspace(calibration):
     low, high = calibration.provenance.measured_f_d_range
     assert low == pytest.approx(6.5, rel=0.05)
     assert high > 15.0
@@ -65,7 +65,7 @@ ROBOT = load("ur5e")
 
 
 @pytest.mark.nightly
-def test_a_small_identification_with_another_seed_is_already_near_the_truth():
+def test_small_identification_is_near_the_truth():
     async def run():
         setup = free_setup(calibration="none", seed=11)
         async with robot_in_process(setup) as robot, robot.control("test") as arm:
@@ -83,7 +83,7 @@ def test_a_small_identification_with_another_seed_is_already_near_the_truth():
         assert estimator.estimate(np.array(pose(name)))[0][0] == pytest.approx(f_d, rel=0.1)
 
 
-def test_polynomials_that_are_in_the_basis_are_found_exactly():
+def test_polynomials_in_the_basis_are_found_exactly():
     rng = np.random.default_rng(1)
     q = rng.uniform(-np.pi, np.pi, (80, 6))
     f_d = 10.0 + np.cos(q[:, 1]) - 2.0 * np.sin(q[:, 1] + q[:, 2])

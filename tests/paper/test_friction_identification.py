@@ -47,7 +47,7 @@ def with_friction(parameters):
     return replace(known, modal=replace(known.modal, parameters=(*known.modal.parameters, *parameters)))
 
 
-def test_breakaway_and_width_of_each_joint_are_found_in_ten_seconds():
+def test_breakaway_torque_and_width_of_each_joint_are_found():
     parameters, seconds = found()
     assert seconds < 20.0
     true = {"breakaway": 1.5, "stribeck_speed": 0.05, "friction_width": 0.03}
@@ -64,7 +64,7 @@ def test_breakaway_and_width_of_each_joint_are_found_in_ten_seconds():
 
 
 @pytest.mark.parametrize("breakaway", [1.0, 1.3])
-def test_the_intervals_contain_the_truth_as_often_as_they_say(breakaway, measured):
+def test_intervals_of_friction_contain_the_truth_at_their_confidence(breakaway, measured):
     speed, unknown = np.concatenate([np.linspace(0.005, 0.3, 70)] * 2), unknown_friction(ROBOT)[1]
     true, inside = np.array([6.0, breakaway, 0.05, 0.03, 3.0]), []
     for seed in range(40):
@@ -81,7 +81,7 @@ def test_the_intervals_contain_the_truth_as_often_as_they_say(breakaway, measure
     assert covered.min() > 0.75
 
 
-def test_friction_that_was_identified_is_compensated_whatever_shapes(measured):
+def test_identified_friction_is_compensated_with_every_shaper(measured):
     """Held-out moves: seed 77 has tuned nothing."""
     known = {"without": calibration("ur5e_modal"), "with": with_friction(found()[0])}
     less = {}
@@ -99,12 +99,12 @@ def test_friction_that_was_identified_is_compensated_whatever_shapes(measured):
     assert median["with", "auto"] > 94.0 > median["without", "auto"]
 
 
-def test_no_room_is_said():
+def test_friction_without_free_path_is_not_measured():
     async def run():
         async with robot_in_process(free_setup()) as robot, robot.control("test") as control:
             await identify_friction(robot, control, ROBOT, [np.zeros(6)])
 
-    with pytest.raises(IdentificationError, match="no room"):
+    with pytest.raises(IdentificationError, match="no path of"):
         asyncio.run(run())
 
 

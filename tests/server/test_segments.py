@@ -242,7 +242,7 @@ def test_a_moved_segment_is_completed_where_it_is(path):
 
 def test_a_replay_without_the_first_ticks_is_refused(path):
     record(path, 350)
-    with pytest.raises(ReplayError, match="has forgotten all before tick 226, so its run cannot be repeated"):
+    with pytest.raises(ReplayError, match="starts at tick 226, and only one from tick 0 can be replayed"):
         replay_file(read(path))
 
 

@@ -15,8 +15,7 @@ from tvist_lab.metrics.measured_motion import still_driven
 from tvist_lab.metrics.ring_down import SKIP, WINDOWS
 from tvist_lab.recordings.recording import MissingColumnError
 
-EARLY = 0.15
-"""How much later than the earliest shaper one may settle, as a share of the settling time without any [-]."""
+EARLY = 0.15  # accepted settling after the earliest shaper, relative to that without any [-]
 CLOSE = 5.0  # vibration that a shaper may leave beyond the least of these [percentage points]
 SIMPLE = (ROBOT, ONE, EACH)  # where modes can come from, the simplest first
 RIPPLES = ("actual_qd", "actual_current", "actual_moment", "actual_q")

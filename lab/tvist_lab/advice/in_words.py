@@ -8,7 +8,7 @@ from typing import Any
 from tvist_lab.advice.advise import Advice
 from tvist_lab.advice.options import ANY, EACH, ROBOT, Option
 from tvist_lab.metrics import MeasuredRecording
-from tvist_lab.words import counted, spread
+from tvist_lab.phrases import counted, spread
 
 NEVER = "ring longer than the recorded rest"
 NAMED = 3  # largest number of modes that a sentence names
@@ -157,10 +157,9 @@ def as_dict(advice: Advice, logs: Sequence[MeasuredRecording]) -> dict[str, Any]
 
 
 def _option(one: Option) -> dict[str, Any]:
-    by_modes = one.modes_percent
     return {
         "shaper": one.shaper, "modes": one.count, "aim": one.aim.scope, "keeps_limits": one.keeps_limits,
-        "added_s": one.added_s, "left_percent": one.left_percent, "left_by_modes_percent": by_modes,
+        "added_s": one.added_s, "left_percent": one.left_percent, "left_by_modes_percent": one.modes_percent,
         "still_s": _finite(one.still_s), "optimistic": len(one.aim.optimistic),
         "aimed_at": {str(group): [list(mode) for mode in modes] for group, modes in one.aim.modes.items()},
         "motions": [

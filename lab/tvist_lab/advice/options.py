@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize
 
-from tvist_lab.advice.stops import ResidualVibration, StopWithRest, followed, shaped_by
+from tvist_lab.advice.stops import ResidualVibration, StopWithRest, followed
 from tvist_lab.metrics import NotMeasurableError
 from tvist_lab.metrics.ring_down import decay_rate
 from tvist_lab.recordings import Floats
@@ -19,8 +19,7 @@ from tvist_shaping import SHAPERS, Impulses, ShapingError, product, residual
 Modes = tuple[tuple[float, float], ...]  # (f_d, ζ) of each mode, the lowest first [Hz, -]
 BEGIN = (0.05, 0.2)  # damping ratios from which a search starts [-]
 DAMPED = (0.005, 0.4)  # range of damping ratios in a search [-]
-BESIDE = (0.7, 1.4)
-"""Range of frequencies in a search, relative to the lowest and the highest fitted mode [-]."""
+BESIDE = (0.7, 1.4)  # range of a search, relative to the lowest and the highest fitted mode [-]
 ANY = (5.0, 25.0)  # range of frequencies in a search if no modes are known [Hz]
 TRIALS = 60  # largest number of search steps for each mode
 ENOUGH = 12  # number of stops from which modes are found; if there are more, the loudest count
@@ -119,7 +118,7 @@ def _judged(name: str, aim: Aim) -> Option | None:
     for stop, modes in aim.judged.items():
         try:
             impulses = impulses_of(name, modes)
-            left[stop] = shaped_by(stop, impulses)
+            left[stop] = stop.left(impulses)
         except (NotMeasurableError, ShapingError):
             return None  # one that some motion cannot be judged by is no choice for all
         added[stop] = float(impulses.tau[-1])
@@ -148,7 +147,7 @@ def smoothed(stop: StopWithRest, added: float) -> float | None:
     The mean lowers the jerk, and the motion ends later by `added`. None if too little rest was recorded.
     """
     try:
-        left = stop.left(np.full(COPIES, 1.0 / COPIES), np.linspace(0.0, added, COPIES))
+        left = stop.left(Impulses(np.full(COPIES, 1.0 / COPIES), np.linspace(0.0, added, COPIES)))
     except NotMeasurableError:
         return None
     return 100.0 * left.rms / stop.unshaped.rms
@@ -187,8 +186,7 @@ def _aims(stops: Sequence[StopWithRest]) -> list[Aim]:
     groups = {group: [one for one in stops if one.group == group] for group in {one.group for one in stops}}
     aims = []
     for count in (1, 2):
-        of_all = best_modes(stops, count)
-        aims.append(Aim(ONE, dict.fromkeys(groups, of_all), *_held_out(stops, count)))
+        aims.append(Aim(ONE, dict.fromkeys(groups, best_modes(stops, count)), *_held_out(stops, count)))
         if len(groups) > 1:
             parts = [_held_out(of_one, count) for of_one in groups.values()]
             judged = {stop: modes for part, _ in parts for stop, modes in part.items()}
@@ -231,10 +229,8 @@ def best_modes(stops: Sequence[StopWithRest], count: int) -> Modes:
 
     def cost(modes: Modes) -> float:
         try:
-            return (
-                sum(shaped_by(one, impulses_of("zv", modes), gears=False).rms ** 2 for one in loudest)
-                / before
-            )
+            impulses = impulses_of("zv", modes)
+            return sum(one.left(impulses, gears=False).rms ** 2 for one in loudest) / before
         except NotMeasurableError:
             return 1.0
 

@@ -16,11 +16,9 @@ from tvist_lab.recordings import Floats
 
 WAVES = 202.0  # waves of the error per turn of a joint [-]: of gears with a ratio of 101, as most of UR's
 WINDOW = (-0.6, 0.5)  # time around the stop in which the waves are fitted [s]
-BRAKING = 0.5
-"""Weight of the time before the stop [-], in which the arm's own acceleration is described less well."""
+BRAKING = 0.5  # weight of the time before the stop, when the arm accelerates itself [-]
 ERROR = 2e-5  # displacement of the tool by which gear errors may move it: 2e-5 rad at one metre [m]
-ALIKE = 15.0
-"""Factor by which neighbouring samples of a fit's residual are worth less than independent ones [-]."""
+ALIKE = 15.0  # factor by which neighbouring samples of a residual count less [-]
 PHASES = (np.sin, np.cos)
 TURNS = 0.05  # smallest travel of a joint that counts [rad]
 

@@ -16,7 +16,7 @@ import numpy as np
 from tvist_lab.advice.ripple import Ripple, fitted, poles_of
 from tvist_lab.metrics import MeasuredRecording, MotionResult, MotionRows, NotMeasurableError
 from tvist_lab.metrics.common_clock import NOISE_PEAK, RINGS, STILL, acceleration_of
-from tvist_lab.metrics.comparison import MotionEnds
+from tvist_lab.metrics.comparison import ends_of, same_ends
 from tvist_lab.metrics.ring_down import fit_ring_down
 from tvist_lab.metrics.vibration import low_pass_at
 from tvist_lab.recordings import Floats, Recording
@@ -84,25 +84,16 @@ class StopWithRest:
         noise = _noise(alpha[even >= even[-1] - TAIL], recording.period)
         return cls(file, place + 1, measured, motion, measured.results[place], even, alpha, q, noise)
 
-    @cached_property
-    def way(self) -> MotionEnds:
-        """Start and target of the motion."""
-        return MotionEnds.of(self.measured.recording, self.motion)
-
-    @property
-    def duration(self) -> float:
-        """Duration of the reference [s]."""
-        return self.motion.duration(self.measured.recording)
-
     def repeats(self, other: "StopWithRest") -> bool:
         """Whether both are the same motion at the same speed."""
-        longer = bool(abs(self.duration / other.duration - 1.0) >= SAME_DURATION)
-        return not longer and self.way.corresponds(other.way)
+        both = [(one.measured.recording, one.motion) for one in (self, other)]
+        mine, theirs = (motion.duration(recording) for recording, motion in both)
+        return abs(mine / theirs - 1.0) < SAME_DURATION and same_ends(*(ends_of(*one) for one in both))
 
     @cached_property
     def unshaped(self) -> ResidualVibration:
         """Recorded vibration."""
-        return self.left(np.ones(1), np.zeros(1))
+        return self.left(Impulses(np.ones(1), np.zeros(1)))
 
     @property
     def rings(self) -> bool:
@@ -123,35 +114,36 @@ class StopWithRest:
         ends = np.array([self.q.min(axis=0), self.q.max(axis=0)])
         return ripple.along(q, ends, float(self.time[1] - self.time[0]))
 
-    def after(self, sizes: Floats, delays: Floats, *, gears: bool = True) -> Floats:
-        """Acceleration if the reference were a sum of delayed copies, shape (T, 3) [m/s²].
+    def after(self, impulses: Impulses, *, gears: bool = True) -> Floats:
+        """Return the acceleration if impulses had shaped the reference, shape (T, 3) [m/s²].
 
-        The sizes of the copies sum to 1; the largest delay [s] is last. `gears` adds what the gears excite
-        along the new path.
+        `gears` adds what the gears excite along the new path.
         """
-        shaped = self._sum(self.alpha - self._of_gears, sizes, delays)
+        shaped = self._sum(self.alpha - self._of_gears, impulses)
         if gears and self._ripple is not None:
-            shaped += self._waves(self._ripple, self._sum(self.q, sizes, delays))
+            shaped += self._waves(self._ripple, self._sum(self.q, impulses))
         return shaped
 
-    def _sum(self, signal: Floats, sizes: Floats, delays: Floats) -> Floats:
+    def _sum(self, signal: Floats, impulses: Impulses) -> Floats:
+        delays = impulses.tau
         moved = [[np.interp(self.time - delay, self.time, axis) for axis in signal.T] for delay in delays]
-        return np.asarray(np.tensordot(sizes, moved, axes=1).T)
+        return np.asarray(np.tensordot(impulses.A, moved, axes=1).T)
 
-    def left(self, sizes: Floats, delays: Floats, *, gears: bool = True) -> ResidualVibration:
+    def left(self, impulses: Impulses, *, gears: bool = True) -> ResidualVibration:
         """Return the predicted vibration, see `after`; raise NotMeasurableError if too little rest remains."""
-        shaped, late = self.after(sizes, delays, gears=gears), self.time - float(delays[-1]) - COUNTED_FROM
+        last = float(impulses.tau[-1])
+        shaped, late = self.after(impulses, gears=gears), self.time - last - COUNTED_FROM
         counts = (late > 0.0) & (late <= COUNTED[1])
         if late[-1] < COUNTED[0]:
             raise NotMeasurableError("too little rest is left after the shaped stop")
         power = np.sum(shaped**2, axis=1)
-        noise = self.noise * float(np.sum(np.square(sizes)))
+        noise = self.noise * float(np.sum(np.square(impulses.A)))
         limit = max(STILL, NOISE_PEAK * (noise / 3.0) ** 0.5)
         loud = np.flatnonzero((late > 0.0) & (power > limit**2))
-        still = float(self.time[loud[-1]]) if loud.size else float(delays[-1])
+        still = float(self.time[loud[-1]]) if loud.size else last
         if loud.size and loud[-1] == len(late) - 1:
             still = np.inf
-        least = (NONLINEAR * self.unshaped.rms) ** 2 if len(sizes) > 1 else 0.0
+        least = (NONLINEAR * self.unshaped.rms) ** 2 if len(impulses.A) > 1 else 0.0
         return ResidualVibration((max(float(np.mean(power[counts])) - noise, 0.0) + least) ** 0.5, still)
 
 
@@ -168,11 +160,6 @@ def _noise(tail: Floats, period: float) -> float:
 
 def _at(times: Floats, time: Floats, values: Floats) -> Floats:
     return np.column_stack([np.interp(times, time, axis) for axis in values.T])
-
-
-def shaped_by(stop: StopWithRest, impulses: Impulses, *, gears: bool = True) -> ResidualVibration:
-    """Predict the vibration after a stop with a shaper; see `StopWithRest.left`."""
-    return stop.left(np.asarray(impulses.A), np.asarray(impulses.tau), gears=gears)
 
 
 def grouped(stops: Sequence[StopWithRest]) -> list[StopWithRest]:

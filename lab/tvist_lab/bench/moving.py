@@ -4,7 +4,7 @@ import gc
 import time
 from collections.abc import Callable
 from itertools import count
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,29 +23,18 @@ from tvist_lab.in_process import free_setup
 from tvist_lab.studies.paper.published import pose
 from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
-from tvist_plant.plant import PERIOD
+from tvist_plant.plant import PERIOD, SimulatedArm
 from tvist_protocol.codec import decode_reply, encode
 from tvist_protocol.commands import Command, MoveJ, ServoStart, Setpoint, TakeControl
 from tvist_protocol.replies import Refused
 from tvist_protocol.simulation import SimulationReset, SimulationStep
 from tvist_shaping import TvistFilter, shaper
 
-TICKS = 500
-"""Ticks of a run: the first second of the motion from Q1 to Q3, which lasts longer with every filter."""
+TICKS = 500  # ticks of a run: the first second of the motion from Q1 to Q3
 LIMITS = MotionLimits(1.5, 2.0, 100.0)
 
 Floats = NDArray[np.float64]
 Run = Callable[[], float]  # makes one run and returns its result, here the processor time of a tick [µs]
-
-
-class MeasuredArm(Protocol):
-    """An arm moved by drives."""
-
-    def reset(self, command: DriveCommand) -> object:
-        """Put the arm to rest at a position."""
-
-    def step(self, command: DriveCommand) -> object:
-        """Simulate one period."""
 
 
 def line_tick(shaper: str) -> Run:
@@ -106,7 +95,7 @@ def plant_tick() -> Run:
     return arm_tick(FlexibleArm(setup.description, body(setup.payload)))
 
 
-def arm_tick(arm: MeasuredArm) -> Run:
+def arm_tick(arm: SimulatedArm) -> Run:
     """Measure a tick of an arm that makes the motion."""
     setup = free_setup(truth=False)
     dynamics = InverseDynamics(setup.description, body(setup.payload))

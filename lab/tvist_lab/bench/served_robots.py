@@ -28,8 +28,7 @@ from tvist_protocol.stream import State, Telemetry
 SWING = 0.05  # amplitude of the streamed sine [rad]
 COMMANDS = 200  # number of commands whose response time is measured
 NUMBERS = (1, 2, 4, 8, 12, 16, 20, 24, 28, 32, 40, 48, 64)  # numbers of robots to try, in order
-FAILURES = 2
-"""Consecutive failures after which no larger numbers are tried; a single one may be the machine's fault."""
+FAILURES = 2  # consecutive failures after which no larger numbers are tried
 TRIES = 2  # number of tries, of which the better counts, since other load only adds lateness
 MISSED = 0.001  # share of its ticks that each robot may miss [-]
 SETTLE = 2  # number of telemetry messages ignored at first, to exclude the start
@@ -202,8 +201,7 @@ async def _worst_share(number: int, seconds: float, options: Sequence[str]) -> f
     loop, enough = asyncio.get_running_loop(), asyncio.Event()
 
     def on_telemetry(sample: zenoh.Sample) -> None:
-        told = heard[str(sample.key_expr)]
-        told.append(decode(Telemetry, sample.payload.to_bytes()))
+        heard[str(sample.key_expr)].append(decode(Telemetry, sample.payload.to_bytes()))
         if len(heard) == number and all(len(one) > SETTLE + seconds for one in heard.values()):
             loop.call_soon_threadsafe(enough.set)
 

@@ -41,10 +41,7 @@ def _worst_stop(advice: Advice) -> Figure:
     assert advice.best is not None
     stop = max(advice.best.left, key=lambda one: one.unshaped.rms)
     impulses = impulses_of(advice.best.shaper, advice.best.aim.judged[stop])
-    recorded, shaped = (
-        amplitude(alpha)
-        for alpha in (stop.alpha, stop.after(np.asarray(impulses.A), np.asarray(impulses.tau)))
-    )
+    recorded, shaped = (amplitude(alpha) for alpha in (stop.alpha, stop.after(impulses)))
     figure, (panel,) = panels(1, 3.4)
     ms = 1e3 * stop.time
     panel.plot(ms, recorded, **OF_UNSHAPED.line(1.8, label="recorded"))

@@ -9,7 +9,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.signal import spectrogram
 
-from tvist_lab.change import MotionChange
 from tvist_lab.figures.recorded import Recorded
 from tvist_lab.figures.style import (
     ALPHA,
@@ -38,13 +37,13 @@ from tvist_lab.metrics import (
     still_after,
 )
 from tvist_lab.metrics.common_clock import AFTER_STOP, STILL, acceleration_of
+from tvist_lab.metrics.comparison import MotionChange
 from tvist_lab.metrics.ring_down import WINDOWS, RingDown
 from tvist_lab.metrics.table import ring_down_of
 from tvist_lab.recordings import Floats, Recording
 
 SHOWN = (-50.0, 350.0)  # time shown before and after the end of the unshaped motion's reference [ms]
-HEADROOM = 1.6
-"""Height of the axis over the larger peak [-]: shows the end of the braking without shrinking the peaks."""
+HEADROOM = 1.6  # height of the axis over the larger peak, to show the end of braking [-]
 WORDS_AT = 100.0  # time at which the names of the curves start [ms]
 BEFORE, AFTER = 100.0, 600.0  # time shown before and after the stop of the first of several curves [ms]
 BEFORE_S, AFTER_S = 0.1, 0.7  # time shown before and after the stop [s]
@@ -203,8 +202,7 @@ def ring_down_figure(name: str, recorded: Recorded) -> Figure:
     figure, (course, spectrum, levels) = panels(3, 6.6, share_x=False, ratios=(1.0, 1.0, 1.4))
     title(course, name)
 
-    strongest = np.linalg.svd(alpha[after], full_matrices=False)[2][0]
-    along = (alpha - alpha[after].mean(axis=0)) @ strongest
+    along = (alpha - alpha[after].mean(axis=0)) @ np.linalg.svd(alpha[after], full_matrices=False)[2][0]
     course.plot(1e3 * time, along, **OF_SHAPED.line(1.1, label="Along its strongest axis"))
     words = "no mode is fitted"
     if fit.ok:

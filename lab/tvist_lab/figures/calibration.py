@@ -32,8 +32,7 @@ from tvist_plant.model import rigid_model
 LABELS = {
     "f_d_hz": ("$f_d$", "damped frequency of the lowest mode", "Hz"),
     "zeta": (r"$\zeta$", "damping ratio of the lowest mode", "–"),
-}
-"""Symbol, meaning and unit of each map, by its key."""
+}  # symbol, meaning and unit of each map, by its key
 NARROW = 5.0  # width up to which maps are drawn one below the other [inch]
 LEVELS = 9  # largest number of levels of a map
 

@@ -158,8 +158,7 @@ def figure_2(modes: OneJointModes) -> Figure:
     note(arms, "Actuator with\nflexibility", (-0.09, 0.0), ha="right", va="center", wrap=False)
     arms.set(xlim=(-0.36, 2 * APART + 0.36), ylim=(-0.23, upper + forearm + 0.03), aspect="equal")
     arms.set_axis_off()
-    masses = sorted({one.mass for one in modes.curve})
-    for mass, style in zip(masses, SERIES, strict=False):
+    for mass, style in zip(sorted({one.mass for one in modes.curve}), SERIES, strict=False):
         here = [one for one in modes.curve if one.mass == mass]
         elbow = np.degrees([one.elbow for one in here])
         hollow = style.points(4.5, markerfacecolor="white", label=f"{mass:g} kg, simulated", zorder=3)
@@ -203,5 +202,4 @@ def _draw_arm(panel: Axes, x: float, upper: float, forearm: float, pose: Plucked
     spring = x + radius * np.sin(turn), radius * np.cos(turn)
     panel.plot(*spring, color=UNSHAPED, linewidth=1.2, zorder=5)
     note(panel, f"$q$ = {np.degrees(elbow):.0f}°", (x - 0.02, upper + 0.1), ha="right", va="center")
-    words = f"$I$ = {pose.inertia:.3f} kg m²{word}"
-    panel.annotate(words, (x, -0.085), ha="center", va="top")
+    panel.annotate(f"$I$ = {pose.inertia:.3f} kg m²{word}", (x, -0.085), ha="center", va="top")

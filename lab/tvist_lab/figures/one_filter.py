@@ -196,9 +196,8 @@ def _draw_parts(panel: Axes) -> None:
     panel.text(2.28, -0.55, "$I_i$")
     panel.text(3.33, -0.75, "$x^*_{i-1}$", color=MUTED)
     panel.plot([3.27, 3.27, 2.74], [-0.2, -1.0, -1.0], color=INK, linewidth=1.1)
-    along = [((start, 0.0), (start + 0.16, 0.0)) for start in (0.56, 1.61, 2.66)]
     for start, end in (
-        *along,
+        *[((start, 0.0), (start + 0.16, 0.0)) for start in (0.56, 1.61, 2.66)],
         ((-0.42, 0.0), (-0.2, 0.0)),
         ((2.22, -0.7), (2.22, -0.3)),
         ((2.9, -1.0), (2.68, -1.0)),

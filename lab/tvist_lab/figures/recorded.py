@@ -31,8 +31,7 @@ from tvist_lab.metrics.vibration import amplitude, tool_acceleration
 from tvist_lab.recordings import Floats, Recording
 
 LEAD, REST = 0.1, 1.0  # time shown before the reference's start and after the shaped reference's stop [s]
-POSITION_RANGE_MM = 0.15
-"""Largest distance to the final position on the axis [mm]; five times the repeatability."""
+POSITION_RANGE_MM = 0.15  # largest distance on the axis: five times the repeatability [mm]
 SYMBOLS = {
     r"$\ddot q^*$": "acceleration of the shaped reference",
     "$E$": "distance of the tool from where it comes to rest",
@@ -59,8 +58,7 @@ OF_DISTANCE = {
 BEFORE_STOP, AFTER_STOP = 0.1, 0.4
 """Time shown in figure 16 before the unshaped reference's stop and after the shaped one's [s]."""
 NOISE_TIME = 0.2  # time at the end of the recorded rest from which the noise is found [s]
-LOUD = 1.2
-"""Ratio to the largest noise above which a peak belongs to a vibration [-]; a decay needs two such peaks."""
+LOUD = 1.2  # ratio to the largest noise above which a peak belongs to a vibration [-]
 DASHES = (0, (4, 2))
 ARROW = {"arrowstyle": "<->", "color": INK, "linewidth": 1.0, "shrinkA": 0, "shrinkB": 0}
 BOTH = {"Unshaped": (OF_UNSHAPED, "$t_b$"), "Shaped": (OF_SHAPED, "$t_b^*$")}
@@ -229,8 +227,7 @@ def figure_16(motions: Mapping[str, tuple[Recorded, Recorded]]) -> Figure:
         )
     axes[0].plot([], [], color=INK, linestyle=DASHES, label="Decay fitted to the peaks")
     axes[-1].set_xlabel("Time (s)")
-    meaning = "residual vibration, |α| of the fit at the stop"
-    legend(figure, axes[0], OF_ALPHA | STOPS | {"RV": meaning})
+    legend(figure, axes[0], OF_ALPHA | STOPS | {"RV": "residual vibration, |α| of the fit at the stop"})
     return figure
 
 

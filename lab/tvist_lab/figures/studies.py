@@ -25,16 +25,15 @@ from tvist_lab.figures.style import (
     tint,
     title,
 )
+from tvist_lab.phrases import QUANTILES_FROM
 from tvist_lab.study.measures import WORTH
 from tvist_lab.study.work import Row
-from tvist_lab.words import QUANTILES_FROM
 
 EACH = 0.22
 """Height for each setting of a sweep [inch]."""
 LONG_NAME = 16  # length from which a name takes two lines [letters]
 FLOOR = 1e-4  # smaller peaks are drawn at this value [m/s²]
-NOTICEABLE = 1.01
-"""Largest peak over its limit that still counts as keeping it [-]; a filter's own ripple stays below."""
+NOTICEABLE = 1.01  # peak over limit that still counts as keeping it, due to a filter's ripple [-]
 
 
 def study_figure(

@@ -33,8 +33,7 @@ FAMILIES = {
     "Zero vibration": ("zv", "mzv", "zvd", "zvdd", "zvddd"),
     "Extra-insensitive": ("ei", "ei_exact", "si", "ei2", "ei2_exact", "ei3", "ei3_exact"),
     "Negative impulses: short, but beyond the reference's limits": ("um_zv", "um_zvd"),
-}
-"""Panels and their shapers; all others share a last panel."""
+}  # panels and their shapers; all others share a last panel
 SHOWN_SHARE = (0.4, 1.7)  # range of the axis: true divided by assumed frequency [-]
 HIGHEST = 25.0  # largest residual vibration on the axis [%]
 WIDEST = 1.6  # largest band width on the axis; unlimited bands are drawn here [-]

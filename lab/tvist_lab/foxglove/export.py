@@ -39,16 +39,14 @@ from tvist_protocol.stream import State
 _, Y, Z = np.eye(3)
 BASE, PAYLOAD = "world", "payload"
 THIN = 0.04  # radius of a link of unknown shape, relative to the arm's reach [-]
-PICTURE_TICKS = 10
-"""Ticks between two frames messages: 50 a second show a vibration of 10 Hz, and viewers interpolate."""
+PICTURE_TICKS = 10  # ticks between two frames messages, since viewers interpolate
 DIGITS = 9  # decimals of positions [m] and quaternions; rounding makes the file a third smaller
 LIGHT, DARK = (0.85, 0.87, 0.89), (0.36, 0.40, 0.44)
 """Colours of the arm's links, and of its base and payload: red, green, blue."""
 SCHEMAS = {"frames": "foxglove.FrameTransforms", "arm": "foxglove.SceneUpdate", "curves": "tvist.curves"}
 """Schema of each channel, by the end of its topic; viewers know those of Foxglove by name."""
 
-_Entry = tuple[int, str, Schema | None, Any]
-"""Time [ns], topic, schema, and the message: as recorded, or its content."""
+_Entry = tuple[int, str, Schema | None, Any]  # time [ns], topic, schema, and message
 
 
 @dataclass(frozen=True)
@@ -88,7 +86,7 @@ def arm_of(content: RecordingFile) -> FoxgloveArm:
     """Return the arm of a recording from its robot file, which servers record."""
     if "description" not in (content.start or {}):
         raise RecordingError(
-            f"{content.path} does not say what its robot looks like: record it with tvist serve --record"
+            f"{content.path} does not describe its robot: record it with tvist serve --record"
         )
     try:
         robot = checked((content.start or {})["description"], RobotDescription)
@@ -213,8 +211,7 @@ def _schema_of(example: Any) -> dict[str, Any]:
         return {"type": "object", "properties": {name: _schema_of(part) for name, part in example.items()}}
     if isinstance(example, list):
         return {"type": "array", "items": _schema_of(max(example, key=lambda one: len(str(one)), default={}))}
-    kinds = {bool: "boolean", int: "integer", float: "number"}
-    return {"type": kinds.get(type(example), "string")}
+    return {"type": {bool: "boolean", int: "integer", float: "number"}.get(type(example), "string")}
 
 
 def _entity(arm: FoxgloveArm, body: Body) -> dict[str, Any]:
@@ -254,7 +251,7 @@ def _stood(content: RecordingFile, arm: FoxgloveArm) -> tuple[tuple[Floats, Floa
         true = recording["truth_motor_q"][rows] + recording["truth_gear_deflection"][rows]
         bent = recording["truth_link_deflection"][rows] if arm.bending else bends
         if true.shape != q.shape or bent.shape != bends.shape:
-            raise RecordingError(f"{content.path} holds a truth that is not of the arm in it")
+            raise RecordingError(f"{content.path} has a truth of another arm")
         known = np.asarray(np.isfinite(np.hstack([true, bent])).all(axis=1))
         q, bends = np.where(known[:, None], true, q), np.where(known[:, None], bent, 0.0)
         if share := 100.0 * np.mean(~known):
@@ -270,14 +267,13 @@ def _transforms(
     names = list(pairwise(arm.frames))
     for number, tick in enumerate(ticks.astype(int).tolist()):
         time = tick * TICK_NS if number else first
-        steps = zip(names, places[number], turns[number], strict=True)
         yield (
             time,
             {
                 "transforms": [
                     {"timestamp": _stamp(time), "parent_frame_id": parent, "child_frame_id": child}
                     | {"translation": _named(place), "rotation": _named(turn)}
-                    for (parent, child), place, turn in steps
+                    for (parent, child), place, turn in zip(names, places[number], turns[number], strict=True)
                 ]
             },
         )

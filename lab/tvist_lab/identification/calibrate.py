@@ -40,7 +40,7 @@ from tvist_lab.identification.ring_downs import (
 )
 from tvist_lab.identification.unknowns import ArmModes
 from tvist_lab.recordings import Floats
-from tvist_lab.workspace import identified, ranges
+from tvist_lab.workspace import identified
 from tvist_plant.description import RobotDescription
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_protocol.calibration import Calibration, ModalModel, Provenance, RingDownFit, Spread
@@ -49,15 +49,12 @@ from tvist_shaping.errors import EstimatorError
 from tvist_shaping.estimators.drivetrain import Drivetrain
 
 REPORTED_MODES = 3  # number of modes whose errors are reported
-MAX_RING_DOWNS = 48
-"""Number of ring-downs to which springs and drives are fitted; more take longer and add little."""
+MAX_RING_DOWNS = 48  # number of ring-downs that are fitted; more add little
 WORKSPACE = 200  # number of configurations over which the range of the modes is determined
-MARGIN = 0.85
-"""Margin on the lowest frequency over the workspace, and on the distance to the highest damping ratio [-]."""
+MARGIN = 0.85  # margin on the lowest frequency and on the highest damping ratio [-]
 PLACES = 100  # number of configurations over which the calibration's accuracy is determined
 UNSEEN = 60  # number of configurations at which a calibration is compared with the truth
-KNOWN = 5.0
-"""Largest half-width of the 95 % interval of the lowest f_d for a configuration to count as known [%]."""
+KNOWN = 5.0  # largest half-width of the interval of a known configuration's lowest f_d [%]
 PROPOSED = 3
 CANDIDATES = 40  # number of configurations from which proposed moves are chosen
 
@@ -81,8 +78,7 @@ class Found:
     forecast: ModeForecast
     known_percent: float
     """Share of the workspace in which the lowest f_d is known within `KNOWN` with the heaviest payload [%]."""
-    least_known: tuple[Floats, ForecastModes]
-    """Configuration of the workspace with the least known mode, and that mode."""
+    least_known: tuple[Floats, ForecastModes]  # configuration with the least known mode
     proposals: tuple[Jog, ...]  # jogs that would add most information
     no_polynomial: str  # why the calibration has no polynomials; empty if it has
 
@@ -175,7 +171,7 @@ def calibrate(
     every = [replace(one, softening=ringings[0].softening) for one in ringing]
     calibration, no_polynomial = _with_polynomials(calibration, arm, every, fit)
     progress("looking for moves that would tell more")
-    places = identified(ranges(description)).spread(PLACES, description.joints, 1)
+    places = identified(description).spread(PLACES, description.joints, 1)
     heaviest = max(range(len(arm.payloads)), key=lambda number: arm.payloads[number].mass)
     known = [forecast.at(q, heaviest) for q in places]
     half = np.array([one.f_d_percent[0] for one in known])
@@ -292,7 +288,7 @@ def true_errors(
 
 def mode_range(description: RobotDescription, drivetrain: Drivetrain) -> tuple[float, float]:
     """Return the lowest f_d and highest ζ that a filter must support up to the rated payload, with a margin."""
-    everywhere = identified(ranges(description)).spread(WORKSPACE, description.joints, 0)
+    everywhere = identified(description).spread(WORKSPACE, description.joints, 0)
     masses = (0.0, description.limits.payload)
     whole = ArmModes(description, [paper_payload(description, mass) for mass in masses])
     poles = [lowest_poles(drivetrain, whole.mass(q, payload)) for payload in range(2) for q in everywhere]

@@ -16,7 +16,7 @@ from tvist_lab.identification.modal_fit import information
 from tvist_lab.identification.ring_downs import BEGINS, LONGEST, Ringing
 from tvist_lab.identification.unknowns import ArmModes
 from tvist_lab.recordings import Floats
-from tvist_lab.workspace import identified, ranges
+from tvist_lab.workspace import identified
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 from tvist_protocol.values import Payload
@@ -52,7 +52,7 @@ def free_configurations(
     models = [CollisionModel(description, body(payload)) for payload in payloads]
     jog = jog_of(joints)
     aside = np.zeros(joints) if like is None else like * [joint not in (1, 2, 3) for joint in range(joints)]
-    spread = identified(ranges(description), LENGTH).spread(20 * count, joints, seed) + aside
+    spread = identified(description, LENGTH).spread(20 * count, joints, seed) + aside
     ends = (q for q in spread if all(model.meeting(end) is None for model in models for end in (q, q - jog)))
     return list(islice(ends, count))
 

@@ -22,10 +22,8 @@ DIFFERENCE_STEP = 1e-3  # step of a logarithm for finite differences [-]
 MIN_ERRORS = (0.015, 0.06)
 """Smallest assumed errors of f_d and ζ [-]: joints that share a parameter differ; friction and gears are nonlinear."""
 FEWEST = 6  # number of modes in left-out ring-downs needed to check the intervals
-CONTRADICTION = 0.2
-"""Share of a ring-down explained only by its own poles from which it contradicts the others [-]."""
-SIGNIFICANT = 60.0
-"""Significance required for a contradiction, to exclude noise; see `OwnPoles.significance` [-]."""
+CONTRADICTION = 0.2  # share explained only by its own poles that contradicts the others [-]
+SIGNIFICANT = 60.0  # least `OwnPoles.significance` of a contradiction [-]
 SUSPECTS = 3  # number of ring-downs that are left out in turn
 GUILTY = 3  # if more than one in this number is wrong, the wrong ring-downs cannot be determined
 SINGLY = 14  # largest number of configurations that are left out one by one

@@ -19,7 +19,7 @@ from tvist_client.robot import Robot
 from tvist_controller.api.line import MotionLimits
 from tvist_lab.collect import collect
 from tvist_lab.identification.ring_downs import IdentificationError
-from tvist_lab.identification.travel import or_none, reach
+from tvist_lab.identification.travel import reach, unless_collision
 from tvist_lab.identification.unknowns import Unknown, parameter
 from tvist_lab.metrics import motions
 from tvist_lab.metrics.ring_down import widening
@@ -71,18 +71,18 @@ async def _sweep(robot: Robot, control: Arm, places: Sequence[Floats]) -> Record
     period = 1.0 / (await robot.info()).rate_hz
     for middle in places[:PLACES]:
         for side in (0.5 * LENGTH, -0.5 * LENGTH):
-            if await or_none(reach(control, middle - side)) is None:
+            if await unless_collision(reach(control, middle - side)) is None:
                 continue
             with collect(robot) as collected:
                 await robot.advance(round(REST / period))
-                if await or_none(control.move_j(middle + side, **asdict(LIMITS))) is None:
+                if await unless_collision(control.move_j(middle + side, **asdict(LIMITS))) is None:
                     continue
                 await robot.advance(round(REST / period))
                 await control.move_j(middle - side, **asdict(LIMITS))
                 await robot.advance(BLOCK)
             return collected.recording()
     raise IdentificationError(
-        f"there is no room for a way of {LENGTH:g} rad of all joints, which friction is measured on: give the arm more"
+        f"no path of {LENGTH:g} rad of all joints is free of collisions to measure friction: give the arm more room"
     )
 
 
@@ -132,6 +132,5 @@ def fit_friction(unknown: Sequence[Unknown], speed: Floats, torque: Floats) -> t
     jacobian = fit.jac[: len(speed)]
     white = left / noise
     wider = widening(white, len(guess)) ** 2 * max(float(np.mean(white**2)), 1.0)
-    knowledge = jacobian.T @ jacobian / wider + np.diag(deviation**-2)
-    errors = np.sqrt(np.diag(np.linalg.inv(knowledge)))
+    errors = np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian / wider + np.diag(deviation**-2))))
     return tuple(map(parameter, unknown, np.exp(found).tolist(), errors.tolist()))

@@ -38,7 +38,7 @@ from tvist_lab.identification.ring_downs import (
     stops_of,
 )
 from tvist_lab.identification.servo_response import ServoResponse, servo_response
-from tvist_lab.identification.travel import or_none
+from tvist_lab.identification.travel import unless_collision
 from tvist_lab.identification.unknowns import ArmModes
 from tvist_lab.recordings import Floats, Recording
 from tvist_plant.description import RobotDescription
@@ -50,22 +50,19 @@ from tvist_protocol.values import Payload
 
 RING_DOWNS = 12
 MIN_RING_DOWNS = 4  # smallest useful number of ring-downs; with fewer, the model would be mostly guesses
-MAX_CHOSEN = 37
-"""Largest number of ring-downs chosen as the most informative; more are spread over the workspace."""
+MAX_CHOSEN = 37  # most ring-downs chosen for their information; more are spread
 CANDIDATES = 60  # smallest number of configurations to choose from
 CANDIDATES_PER_JOG = 3  # number of candidates for each jog, since the way to some is not free
 CHECK_STEP = 0.03  # step of the fastest joint between postures at which a way is checked [rad]
 GENTLEST = 0.4  # smallest quickness of a jog relative to the quickest [-]
-FIRST = 0.55
-"""Quickness of the first jog relative to what its torques permit [-], since its vibration is still unknown."""
+FIRST = 0.55  # quickness of the first jog relative to what its torques permit [-]
 LOUD, LATER = 0.15, 0.1
 """Rms acceleration per axis to aim at, as after a program's motion [m/s²], and the time after the stop [s]."""
 INEXACT, STICKING = 0.03, 0.2  # share of a ring-down that no model explains [-], normally and if motors stick
 STICKS = 1.5  # ratio of friction at breakaway to that in motion from which a motor sticks [-]
 WAYS = MotionLimits(velocity=1.5, acceleration=2.0, jerk=100.0)  # limits of the ways to the jogs
 GENTLE = 1.0  # acceleration on the ways of a robot that takes only positions [rad/s²]
-TURN, TURNS = 0.1, 2
-"""Angle by which its last joint turns there and back to find the lag [rad], and how often."""
+TURN, TURNS = 0.1, 2  # angle of the last joint's turns to find the lag [rad], their number
 UNKNOWN = 0.15  # time after the stop that is ignored if the lag is unknown [s]
 PAUSE, AFTER = 0.3, 0.6  # rest before a jog, and time recorded after it [s]
 
@@ -121,8 +118,7 @@ class RingDownLogs:
     """Why friction was not measured; empty if it was."""
     seed: int | None = None  # seed of the choice of jogs; None if there was none
     refused: int = 0  # number of jogs that the robot refused because of a collision
-    servo: ServoResponse | None = None
-    """Lag of a robot that takes only positions; None if it follows in another way."""
+    servo: ServoResponse | None = None  # lag of a robot that takes only positions
     seconds: float = 0.0  # robot time that the measurement took [s]
 
 
@@ -219,8 +215,7 @@ def slower(limits: MotionLimits, quickness: float) -> MotionLimits:
 def _quickness(dynamics: InverseDynamics, start: Floats, end: Floats, torque: Floats) -> float:
     """Return the largest quickness of a jog, up to 1, at which the arm rings within its torque limits."""
     # A saturated drive would spoil the ring-down.
-    line = JointLine(start, end)
-    room = acceleration_on_way(dynamics, line, start, end - start, LIMITS.velocity, torque)
+    room = acceleration_on_way(dynamics, JointLine(start, end), start, end - start, LIMITS.velocity, torque)
     return min(1.0, float(np.sqrt(room / (1.0 + REBOUND) / LIMITS.acceleration)))
 
 
@@ -285,7 +280,7 @@ async def _jogs(
         if plan.changed and payload != carried:
             await _carry(control, payload)
             carried = payload
-        recording = await or_none(_jogged(robot, control, jog, plan.ways, share))
+        recording = await unless_collision(_jogged(robot, control, jog, plan.ways, share))
         if recording is None:
             continue
         logs.append(Log(f"jog {number}", replace(recording, info=info), payload, begins, inexact, driven))

@@ -40,10 +40,8 @@ INSIDE = 1e-3  # distance of a starting point from the bounds of the search [-]
 EVALUATIONS = 60
 SOFTENINGS = (0.0, 50.0, 100.0, 200.0, 300.0)
 """Softening by hysteresis to try [1/m]: 200 is 3 % for an amplitude of 1 m/s² at 13 Hz."""
-LOOSE = 0.5
-"""Standard deviation of the logarithms of a ring-down's own f_d and ζ about their starting values [-]."""
-CERTAIN = (0.05, 0.2)
-"""Largest standard errors of a ring-down's own f_d and ζ with which it can judge a model [-]."""
+LOOSE = 0.5  # deviation of the logarithms of own f_d and ζ from their starting values [-]
+CERTAIN = (0.05, 0.2)  # largest errors of own f_d and ζ with which a ring-down can judge a model
 STARTS = 4  # number of starting points of the search; the first one is the guess
 SPREAD = 0.35  # standard deviation of the other starting points about the guess [-]
 
@@ -171,8 +169,7 @@ def fit_from_many(arm: ArmModes, ringings: Sequence[Ringing]) -> ModalFit:
     best = min(fits, key=lambda fit: fit.cost)
     likely = np.array([np.exp(best.cost - fit.cost) for fit in fits])
     apart = np.array([fit.logarithms - best.logarithms for fit in fits])
-    between = np.max(likely[:, None] * apart**2, axis=0)
-    return replace(best, covariance=best.covariance + np.diag(between))
+    return replace(best, covariance=best.covariance + np.diag(np.max(likely[:, None] * apart**2, axis=0)))
 
 
 def softened(arm: ArmModes, ringings: Sequence[Ringing]) -> list[Ringing]:
@@ -215,8 +212,7 @@ class OwnPoles:
     amplitude: Floats  # largest initial |α| of each mode, shape (k,) [m/s²]
     significance: float
     """Increase of the residual's sum of squares with the other poles, over the noise's variance [-]; 8 by chance."""
-    share: float
-    """rms of the part that only these poles explain, relative to the vibration without its noise [-]."""
+    share: float  # rms that only these poles explain, relative to the vibration [-]
 
     @property
     def certain(self) -> list[int]:

@@ -131,8 +131,7 @@ def _observed(log: Log, number: int, motion: MotionRows, payloads: Sequence[Payl
 def repeated(robot: RobotDescription, payload: Payload, motion: Observed) -> Response:
     """Return a served robot's response to a motion, without gear ripple, whose phases are unknown."""
     carried = body(payload)
-    line = DrivenLine(robot, carried)
-    driven = line.drive(motion.start, motion.reference, motion.ticks)
+    driven = DrivenLine(robot, carried).drive(motion.start, motion.reference, motion.ticks)
     smooth = replace(robot, drives=replace(robot.drives, gear_error_amplitude=0.0))
     return respond(FlexibleArm(smooth, carried), driven, 0)
 

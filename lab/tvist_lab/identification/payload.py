@@ -21,10 +21,10 @@ from tvist_controller.api.line import CollisionModel, body, paper_payload
 from tvist_lab.collect import collect
 from tvist_lab.identification.design import most_informative
 from tvist_lab.identification.ring_downs import IdentificationError, Progress, check_model
-from tvist_lab.identification.travel import or_none, reach
+from tvist_lab.identification.travel import reach, unless_collision
 from tvist_lab.identification.unknowns import ball, heavier
 from tvist_lab.recordings import Floats, Recording
-from tvist_lab.workspace import ranges, workspace
+from tvist_lab.workspace import workspace
 from tvist_plant.description import Payload as Body
 from tvist_plant.description import RobotDescription
 from tvist_plant.model import carries_weight, rigid_model
@@ -67,7 +67,7 @@ async def identify_payload(
     check_model(info, description)
     if not carries_weight(description):
         raise IdentificationError(
-            f"no joint of a {info.model} carries weight, so its torques at rest say nothing of the payload: weigh it"
+            f"no joint of a {info.model} carries weight, so its torques at rest do not depend on the payload: weigh it"
         )
     arm = _Regressor(description)
     period = 1.0 / info.rate_hz
@@ -75,7 +75,7 @@ async def identify_payload(
     for q in arm.choose(_free(description, info.payload, seed), 3 * POSES):
         if len(rested) == POSES:
             break
-        held = await or_none(_hold(robot, control, q, period))
+        held = await unless_collision(_hold(robot, control, q, period))
         if held is None:
             continue
         at, torque = held
@@ -219,7 +219,7 @@ def _free(description: RobotDescription, declared: Payload, seed: int) -> list[F
     ]
     rng = np.random.default_rng(seed)
     found: list[Floats] = []
-    for q in workspace(ranges(description), ASIDE).random(20 * CANDIDATES, joints, seed):
+    for q in workspace(description, ASIDE).random(20 * CANDIDATES, joints, seed):
         if len(found) == CANDIDATES:
             break
         q[0] *= 0.25
@@ -250,9 +250,9 @@ async def _swing(robot: Robot, control: Arm, q: Floats, period: float) -> Record
     swing[1:4] = SWING
     for share in (1.0, 0.5, 0.25, -0.25, -0.5):
         with collect(robot) as collected:
-            if await or_none(control.move_j(q + share * swing)) is None:
+            if await unless_collision(control.move_j(q + share * swing)) is None:
                 continue
             await control.move_j(q)
             await robot.advance(round(LOOK / period))
         return collected.recording()
-    raise IdentificationError("there is no room for a short motion: give the arm more")
+    raise IdentificationError("no short motion is free of collisions: give the arm more room")

@@ -13,8 +13,7 @@ from tvist_protocol.calibration import PolynomialModel, Spread
 from tvist_shaping import terms
 
 FOLDS = 10
-DEGREES = (4, 3, 2)
-"""Degree of the polynomials in one, two or three joints; with fewer joints, each term has more data."""
+DEGREES = (4, 3, 2)  # degree of the polynomials in one, two or three joints
 ROUGH = 10.0  # largest error at nine of ten left-out ring-downs with which a polynomial is kept [%]
 
 

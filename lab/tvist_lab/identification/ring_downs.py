@@ -18,15 +18,13 @@ from tvist_plant.plant import PERIOD
 from tvist_protocol.info import Info
 from tvist_protocol.values import Payload
 
-BEGINS = 7 * PERIOD
-"""Time after a stop that is ignored, since the end of the deceleration ramp is no ring-down [s]."""
+BEGINS = 7 * PERIOD  # ignored time after a stop, when the deceleration still ends [s]
 LONGEST, SHORTEST = 0.4, 0.2  # longest and shortest ring-down used [s]
 SLOWEST = 0.01  # longest sampling period that shows an arm's vibration [s]
 LEAST_NOISE = 0.01  # smallest assumed noise, since no model is more accurate [m/s²]
 SIGNAL_TO_NOISE = 1.15  # smallest rms of a ring-down over its noise to contain information [-]
 BEFORE = 0.15  # time before a motion in which the noise is measured [s]
-INEXACT = 0.1
-"""Share of an everyday ring-down that no linear model explains [-], since friction and gears are nonlinear."""
+INEXACT = 0.1  # share of an everyday ring-down that no linear model explains [-]
 UNSHAPED = 1.5  # number of ticks by which an unshaped reference may seem longer than it is
 CONTRADICTS = "it contradicts the others"
 """Reason for a ring-down that no springs and drives explain together with the others."""
@@ -91,9 +89,7 @@ class Log:
             return Payload(mass=mass, com=(x, y, z), inertia=ball(mass))
         if recording.info is not None:
             return cast("Payload", recording.info.payload)
-        raise RecordingError(
-            f"{self.name} does not say what the arm carried: give --payload MASS, 0 for nothing"
-        )
+        raise RecordingError(f"{self.name} has no payload: give --payload MASS, 0 for none")
 
 
 @dataclass(frozen=True)
@@ -135,8 +131,7 @@ def objection(recording: Recording, motion: MotionRows) -> str:
         )
     if motion.stopped:
         return "the motion was stopped before its target"
-    shaped = "reference_q" in recording and motion.delay(recording) > UNSHAPED * recording.period
-    if shaped or (
+    if ("reference_q" in recording and motion.delay(recording) > UNSHAPED * recording.period) or (
         "shaper_delay" in recording and np.any(recording["shaper_delay"][motion.start : motion.end] > 0.0)
     ):
         return "the motion was shaped"

@@ -13,7 +13,7 @@ from tvist_protocol.errors import RefusedError
 Result = TypeVar("Result")
 
 
-async def or_none(measuring: Awaitable[Result]) -> Result | None:
+async def unless_collision(measuring: Awaitable[Result]) -> Result | None:
     """Await a motion or measurement; return None if the robot refuses it because of a collision."""
     try:
         return await measuring
@@ -25,7 +25,7 @@ async def or_none(measuring: Awaitable[Result]) -> Result | None:
 
 async def reach(arm: Arm, q: Floats) -> Motion:
     """Move to a configuration, if a straight line collides via the upright arm; else raise RefusedError `collision`."""
-    if (there := await or_none(arm.move_j(q))) is not None:
+    if (there := await unless_collision(arm.move_j(q))) is not None:
         return there
     upright = np.zeros_like(q)
     upright[[joint for joint in (1, 3) if joint < len(q)]] = -np.pi / 2

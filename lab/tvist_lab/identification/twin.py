@@ -28,8 +28,7 @@ ROUNDS = 5  # largest number of computations of derivatives
 DAMPERS = (0.0, 0.3, 3.0)  # weights of the step's length, each used until it no longer helps [-]
 ENOUGH = 0.01  # relative decrease of the cost below which a step does not help [-]
 FEWEST = 4  # smallest number of motions; with fewer, the twin would be little more than the robot file
-AUDIBLE = 1.5
-"""Smallest measured residual with which a prediction is compared, relative to the noise of three axes [-]."""
+AUDIBLE = 1.5  # smallest residual for comparison, relative to the noise of three axes [-]
 
 
 @dataclass(frozen=True)
@@ -55,8 +54,7 @@ class Twin:
     predictions: tuple[Prediction, ...]  # Predictions of motions that the fit has not seen
     quiet: int  # number of further unseen motions that vibrate too little to compare
     checked: bool  # whether these motions are from separate logs; else each is left out of the fit in turn
-    late_ms: tuple[float, ...]
-    """Time by which another controller's arm follows later than the twin, by motion [ms]."""
+    late_ms: tuple[float, ...]  # delay of another controller's arm after the twin, by motion [ms]
 
     @property
     def robot(self) -> RobotDescription:

@@ -24,17 +24,12 @@ UNSURE = 0.7  # standard deviation of a guess's logarithm [-]: within a factor o
 SET = 0.2  # the same of a robot file's position gain, which the maker sets and which does not scatter [-]
 ROTOR = 0.2  # the same of rotor inertia, which is nearly proportional to torque for a kind of drive [-]
 LINK_MASS = 0.03  # relative standard deviation of each link's mass from the description [-]
-PAYLOAD_MASS = 0.04
-"""Standard deviation of the payload's mass from the declared one, relative to the rated payload [-]."""
-SCATTER = 0.12
-"""Relative standard deviation of each joint of a group from the parameter that the group shares [-]."""
-NARROWER = 0.5
-"""A parameter is identified if measurements reduce its deviation below this share of the guess's [-]."""
-FURTHEST = 3.0
-"""Deviations by which a parameter may differ from the robot file; beyond, it would absorb model errors [-]."""
+PAYLOAD_MASS = 0.04  # deviation of the payload's mass, relative to the rated payload [-]
+SCATTER = 0.12  # relative deviation of a joint from the parameter of its group [-]
+NARROWER = 0.5  # share of the guess's deviation below which a parameter is identified [-]
+FURTHEST = 3.0  # largest deviations of a parameter from the robot file [-]
 STEEL = 7850.0  # Density from which a payload's size is estimated [kg/m³]
-Z_95 = 1.959963984540054
-"""Number of standard deviations that contain a normal variable with 95 % probability [-]."""
+Z_95 = 1.959963984540054  # standard deviations that contain 95 % of a normal variable [-]
 
 
 @dataclass(frozen=True)
@@ -122,8 +117,7 @@ class ArmModes:
     def parameters(self, logarithms: Floats, deviations: Floats | None = None) -> tuple[ModalParameter, ...]:
         """Convert logarithms and their standard deviations to parameters of a calibration."""
         errors = np.zeros(len(logarithms)) if deviations is None else deviations
-        values = np.exp(logarithms).tolist()
-        return tuple(map(parameter, self.unknowns, values, errors.tolist()))
+        return tuple(map(parameter, self.unknowns, np.exp(logarithms).tolist(), errors.tolist()))
 
 
 def heavier(description: RobotDescription, carried: Body) -> list[tuple[RobotDescription, Body]]:

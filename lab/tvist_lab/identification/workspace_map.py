@@ -7,7 +7,7 @@ import numpy as np
 
 from tvist_controller.api.line import CollisionModel, ModeSource, body, paper_payload
 from tvist_lab.recordings import Floats
-from tvist_lab.workspace import identified, ranges, workspace
+from tvist_lab.workspace import identified, workspace
 from tvist_plant.description import RobotDescription
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_protocol.calibration import Calibration
@@ -45,8 +45,7 @@ def workspace_map(
     """
     if description.joints < 2:
         return None
-    limits = ranges(description)
-    changing, whole = identified(limits), workspace(limits)
+    changing, whole = identified(description), workspace(description)
     count = min(len(whole.low), description.joints)
     moved = [joint for joint in range(count) if changing.high[joint] > changing.low[joint]]
     first, second = sorted([*moved, *(joint for joint in range(count) if joint not in moved)][:2])

@@ -31,8 +31,7 @@ SAME_MODE = 0.07  # largest difference of f_d between fits of one mode, and smal
 FOUND_IN = 0.7  # smallest share of the fits that must have found a mode [-]
 MAX_MODES = 3  # largest number of modes that are returned
 FAINT = 0.1  # smallest amplitude of a mode relative to the strongest [-]
-HEAVY = 0.1
-"""Damping ratio from which a mode beside a lighter one may be a driven motion, or two modes in one [-]."""
+HEAVY = 0.1  # damping ratio from which a mode beside a lighter one is suspicious [-]
 BESIDE = 1.5  # largest ratio of the frequencies of two such modes [-]
 RISE = 0.03  # share by which f_d of a real arm rises while a mode decays [-]
 FALL = 0.7  # share by which ζ falls meanwhile [-]
@@ -43,8 +42,7 @@ Let f_d change as e^(-σt), like the amplitude. Its mean, weighted by the square
 the change. Least squares fit the phase, in which late times count more, and give the value after 5/9 of it.
 """
 
-_Fit = tuple[list[Mode], float]
-"""Modes and rms of their residual; each mode's time counts from the start of its fit."""
+_Fit = tuple[list[Mode], float]  # modes and rms of their residual; times count from the fit's start
 
 
 def agreed_modes(alpha: Floats, time: Floats, period: float, begin: float) -> RingDown:
@@ -100,8 +98,7 @@ def _fits(ring: Ring) -> Iterator[_Fit]:
             start = np.column_stack([f_d[inside], np.clip(zeta[inside], 2.0 * DAMPING[0], 0.6)])
             start = start[np.argsort(start[:, 0])]
             apart = np.flatnonzero(np.diff(np.log(start[:, 0])) > SAME_MODE) + 1
-            merged = [one.mean(axis=0) for one in np.split(start, apart)]
-            cost, found = ring.refine(np.concatenate(merged))
+            cost, found = ring.refine(np.concatenate([one.mean(axis=0) for one in np.split(start, apart)]))
             if np.all(np.diff(np.log(np.sort(found[::2]))) > SAME_MODE):
                 fits.append((cost, found))
     chosen = 0

@@ -14,8 +14,7 @@ KEPT = 40
 SURE_DEVIATIONS = 3.7
 """Standard deviations beyond which a change is reported if the scatter is known well: more than normal
 measurements need (1 in 5,000), since those of real motions have heavier tails."""
-SHOWN, CLEAR = 2.0, 2.5
-"""Numbers of standard errors: for the interval in messages, and the least for a change."""
+SHOWN, CLEAR = 2.0, 2.5  # standard errors of the interval in messages, and least of a change
 FARTHEST = 3.5  # largest distance from earlier measurements that counts, in a measurement's own deviations
 BELIEVED = 4.0  # number of measurements that the expected scatter is worth
 OUTLYING = 2.5  # number of deviations beyond which an earlier measurement loses weight

@@ -25,10 +25,8 @@ SCATTER, LEAST = 0.015, 0.04
 LISTENED = 150  # ticks after a stop in which the vibration is measured
 SHORTEST = 100  # smallest number of these ticks, if the next motion starts sooner
 SETTLED = 50  # number of the last of these ticks in which the gears' deflection is measured
-FRICTION = 0.2
-"""Standard deviation of the friction in a torque at rest, relative to the joint's Coulomb friction [-]."""
-OFF = 1e-4
-"""Standard deviation of the angle at rest, due to gear errors and integrators that still move [rad]."""
+FRICTION = 0.2  # deviation of friction in a torque at rest, relative to Coulomb friction [-]
+OFF = 1e-4  # deviation of the angle at rest, due to gear errors and integrators [rad]
 VAGUE = 0.25  # relative error from which a gear's compliance counts as unknown in a pose [-]
 HEAVY = 0.7  # error from which a motion's mass is ignored [kg]
 MASS, GEAR, MODES = (1.0, 0.15, 0.7), (0.4, 0.05, 0.15), (0.1, 0.02, 0.03)

@@ -20,8 +20,7 @@ from tvist_lab.metrics.vibration import (
 from tvist_lab.recordings import Floats, Recording
 
 STILL = 0.1  # |α| below which an arm counts as at rest [m/s²]
-AFTER_STOP = 0.010
-"""Time after the stop from which `evaluate` searches for the peak, when the last ramp has passed [s]."""
+AFTER_STOP = 0.010  # time after the stop when the last ramp has passed [s]
 
 NOISE_PEAK = 5.0  # largest |α| of noise within some seconds, relative to its rms in one axis [-]
 NOISE_TAIL = 0.2  # time at the end of a rest in which the sensor shows its noise [s]
@@ -137,8 +136,7 @@ def envelope(alpha: Floats, period: float) -> Floats:
     40 to 85 % at ζ = 0.34.
     """
     rows = len(alpha)
-    mirrored = np.concatenate([alpha[:0:-1], alpha, alpha[-2::-1]])
-    analytic = hilbert(band_pass(mirrored, period), axis=0)
+    analytic = hilbert(band_pass(np.concatenate([alpha[:0:-1], alpha, alpha[-2::-1]]), period), axis=0)
     return np.asarray(np.linalg.norm(np.abs(analytic), axis=1)[rows - 1 : 2 * rows - 1], dtype=np.float64)
 
 

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from tvist_lab.change import MotionChange
 from tvist_lab.metrics.common_clock import peak_after_stop
 from tvist_lab.metrics.motion import MotionRows
 from tvist_lab.metrics.table import IMPACTS, MeasuredRecording, MotionResult, impact_percent
@@ -17,9 +16,57 @@ SAME = 0.02  # largest difference of a joint angle at start and end between moti
 COMPARED = IMPACTS | {"still_after": "still_after_ms", "peak": "peak_m_s2", "envelope": "envelope_m_s2"}
 """Names of the impacts, and the figures of a motion that they compare."""
 TICK_MS = 2.0  # shortest delay of a shaped reference [ms]: one tick
-SAME_DURATION = (0.02, 0.01)
-"""Largest difference in duration between motions of the same speed: relative [-], or in s."""
+SAME_DURATION = (0.02, 0.01)  # largest difference in duration at the same speed: [-], or [s]
 REFERENCE = "reference_q"
+
+
+@dataclass(frozen=True)
+class MotionChange:
+    """Vibration of the same motion without and with a shaper; None if not measurable."""
+
+    before: float | None  # largest |α| after the unshaped motion [m/s²]
+    after: float | None  # largest |α| after the shaped one [m/s²]
+    still_before: float | None  # time from the start of the unshaped motion until the tool is at rest [ms]
+    still_after: float | None  # time from the start of the shaped motion until the tool is at rest [ms]
+
+    @property
+    def less_percent(self) -> float | None:
+        """Reduction of the vibration [%], negative if it grew; None if not defined."""
+        if self.before is None or self.after is None or self.before == 0.0:
+            return None
+        return 100.0 * (1.0 - self.after / self.before)
+
+    @property
+    def gain_ms(self) -> int | None:
+        """How much earlier the tool is at rest [ms], negative if later; None if it never is."""
+        if self.still_before is None or self.still_after is None:
+            return None
+        return round(self.still_before - self.still_after)
+
+    def as_dict(self) -> dict[str, float | None]:
+        """Return the numbers that the page of `tvist view` shows."""
+        return {
+            "less_percent": self.less_percent, "earlier_ms": self.gain_ms, "before": self.before, "after": self.after,
+        }  # fmt: skip
+
+    def less(self) -> str:
+        """Return the reduction as text."""
+        percent = self.less_percent
+        if percent is None:
+            return "not to be compared"
+        return f"{abs(percent):.0f} % {'less' if percent >= 0.0 else 'more'}"
+
+    def rest(self) -> str:
+        """Return as text how the settling time changed."""
+        if self.gain_ms is not None:
+            return f"came to rest {abs(self.gain_ms)} ms {'earlier' if self.gain_ms >= 0 else 'later'}"
+        if self.still_after is not None:
+            return "came to rest, which the unshaped one did not"
+        return "was not at rest when the recording ended"
+
+    def in_short(self) -> str:
+        """Return both changes as one line of text."""
+        return f"{self.less()}, {self.rest()}"
 
 
 @dataclass(frozen=True)
@@ -73,7 +120,7 @@ class Comparison:
 def compare(first: MeasuredRecording, second: MeasuredRecording) -> Comparison:
     """Pair as many motions of two recordings as possible, in order."""
     # Motions correspond if they start and end at the same joint angles within 0.02 rad.
-    ways = [[MotionEnds.of(one.recording, motion) for motion in one.motions] for one in (first, second)]
+    ways = [[ends_of(one.recording, motion) for motion in one.motions] for one in (first, second)]
     pairs = _pairs(*ways)
     compared = tuple(ComparedMotion(a + 1, b + 1, first.results[a], second.results[b]) for a, b in pairs)
     taken = [{pair[side] for pair in pairs} for side in (0, 1)]
@@ -81,42 +128,30 @@ def compare(first: MeasuredRecording, second: MeasuredRecording) -> Comparison:
     return Comparison(compared, *alone)
 
 
-@dataclass(frozen=True)
-class MotionEnds:
-    """Joint angles at both ends of a motion."""
-
-    start: Floats
-    end: Floats
-
-    @classmethod
-    def of(cls, recording: Recording, motion: MotionRows, column: str = "") -> "MotionEnds":
-        """Return the ends of a motion in a column of joint angles; by default, in the target."""
-        q = recording[column or ("target_q" if "target_q" in recording else "actual_q")]
-        return cls(q[motion.start], q[motion.arm_stop(recording)])
-
-    def corresponds(self, other: "MotionEnds") -> bool:
-        """Whether both ends are the same, within 0.02 rad."""
-        if self.start.shape != other.start.shape:
-            return False
-        away = np.abs(np.concatenate([self.start - other.start, self.end - other.end]))
-        return bool(np.max(away) <= SAME)
+def ends_of(recording: Recording, motion: MotionRows, column: str = "") -> Floats:
+    """Return the joint angles at both ends of a motion, by default of the target, shape (2, n) [rad]."""
+    q = recording[column or ("target_q" if "target_q" in recording else "actual_q")]
+    return q[[motion.start, motion.arm_stop(recording)]]
 
 
-def _pairs(first: Sequence[MotionEnds], second: Sequence[MotionEnds]) -> list[tuple[int, int]]:
+def same_ends(first: Floats, second: Floats) -> bool:
+    """Whether two motions have the same ends, within 0.02 rad."""
+    return first.shape == second.shape and bool(np.max(np.abs(first - second)) <= SAME)
+
+
+def _pairs(first: Sequence[Floats], second: Sequence[Floats]) -> list[tuple[int, int]]:
     """Return the longest sequence of corresponding motions in the order of both recordings."""
-    same = np.array([[a.corresponds(b) for b in second] for a in first], dtype=bool).reshape(
-        len(first), len(second)
-    )
+    same = [[same_ends(a, b) for b in second] for a in first]
     # longest[i, j]: most pairs among the motions from index i in the first and from j in the second.
     longest = np.zeros((len(first) + 1, len(second) + 1), dtype=int)
     for i in reversed(range(len(first))):
         for j in reversed(range(len(second))):
             longest[i, j] = (
-                longest[i + 1, j + 1] + 1 if same[i, j] else max(longest[i + 1, j], longest[i, j + 1])
+                longest[i + 1, j + 1] + 1 if same[i][j] else max(longest[i + 1, j], longest[i, j + 1])
             )
     pairs, i, j = [], 0, 0
     while i < len(first) and j < len(second):
-        if same[i, j]:
+        if same[i][j]:
             pairs.append((i, j))
             i, j = i + 1, j + 1
         elif longest[i + 1, j] >= longest[i, j + 1]:
@@ -193,20 +228,15 @@ def shaper_of(recording: Recording, motion: MotionRows, delay: float | None) -> 
 
 
 def _same(recording: Recording, one: MotionRows, other: MotionRows) -> bool:
-    first, second = (MotionEnds.of(recording, motion, REFERENCE) for motion in (one, other))
-    lasts = one.duration(recording)
-    share, least = SAME_DURATION
-    differs = abs(other.duration(recording) - lasts)
-    return differs <= max(share * lasts, least) and first.corresponds(second)
+    lasts, (share, least) = one.duration(recording), SAME_DURATION
+    if abs(other.duration(recording) - lasts) > max(share * lasts, least):
+        return False
+    return same_ends(*(ends_of(recording, motion, REFERENCE) for motion in (one, other)))
 
 
 def _name(recording: Recording, motion: MotionRows) -> str:
-    poses = getattr(recording.info, "poses", None) or {}
-    q = recording[REFERENCE]
-    ends = [_pose(poses, q[row]) for row in (motion.start, motion.reference_stop)]
-    return " → ".join(ends) if all(ends) else ""
-
-
-def _pose(poses: dict[str, Sequence[float]], q: Floats) -> str:
-    near = (name for name, pose in poses.items() if len(pose) == len(q) and np.abs(q - pose).max() <= SAME)
-    return next(near, "")
+    """Return the named poses at a motion's ends; empty if an end has no name."""
+    poses, ends = getattr(recording.info, "poses", None) or {}, []
+    for q in recording[REFERENCE][[motion.start, motion.reference_stop]]:
+        ends += [name for name, pose in poses.items() if same_ends(q, np.array(pose))][:1]
+    return " → ".join(ends) if len(ends) == 2 else ""

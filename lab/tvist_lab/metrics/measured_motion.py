@@ -19,8 +19,7 @@ SMALLEST = 0.005  # smallest displacement of a motion [rad]; less is vibration
 FEWEST = 16  # smallest number of rows in which motions are sought
 TAPER = 0.03  # longest time for which a joint may have moved below `REST_SPEED` before and after [s]
 LONGEST_LAG = 0.2  # longest lag in the search [s]
-FOLLOWS = 0.05
-"""Largest remaining variance of the distance, relative to the target's, if the arm follows it [-]."""
+FOLLOWS = 0.05  # largest variance of the distance that follows, relative to the target's [-]
 LONGEST_FELT = 0.08  # longest lag in the search with the accelerometer [s]
 FINE = 0.002  # longest step of that search [s]
 SMOOTHED_TARGET = 40.0  # cut-off frequency of the target before it is differentiated twice [Hz]

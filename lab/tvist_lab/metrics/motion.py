@@ -13,8 +13,7 @@ from tvist_lab.metrics.vibration import parts
 from tvist_lab.recordings import Floats, Recording
 
 MOVING = 1e-7  # change per tick above which a reference moves [rad]
-JUMP = 0.05
-"""Change per tick above which a reference was set elsewhere, for example by a reset [rad]; 25 rad/s."""
+JUMP = 0.05  # change per tick above which a reference was set elsewhere; 25 rad/s [rad]
 TICK = 0.002  # time in which that change counts as a jump [s]; longer if a log has longer ticks
 REST = 0.02  # rests of a reference that are shorter, as at a reversal, belong to the motion [s]
 AT_REST = 1e-6  # target speed below which another controller's arm is at rest [rad/s]

@@ -136,10 +136,9 @@ def _exponential(t: Floats, y: Floats) -> tuple[float, float]:
     """Return value at t = 0 and rate of the decaying exponential closest to the points, on a linear scale."""
     slope, log_value = np.polyfit(t, np.log(y), 1)
     # A search that starts at its bound is slow to leave it.
-    start = [float(np.exp(log_value)), max(-float(slope), 1.0)]
     fit = least_squares(
         lambda p: p[0] * np.exp(-p[1] * t) - y,
-        start,
+        [float(np.exp(log_value)), max(-float(slope), 1.0)],
         jac=lambda p: np.column_stack([np.exp(-p[1] * t), -p[0] * t * np.exp(-p[1] * t)]),
         bounds=([0.0, 0.0], [np.inf, np.inf]),
         x_scale=[1.0, 10.0],

@@ -9,22 +9,18 @@ from scipy.optimize import least_squares
 
 from tvist_lab.recordings import Floats
 
-FREQUENCIES = (3.0, 45.0)
-"""Range of damped frequencies in the search [Hz]; for slow samples, up to 0.45 of their rate."""
+FREQUENCIES = (3.0, 45.0)  # range of damped frequencies; up to 0.45 of a slow rate [Hz]
 DAMPING = (0.002, 0.7)  # range of damping ratios in the search [-]
 SLOW_POLE = 17.5
 """Rate of the non-oscillatory tail that a position loop adds [1/s]."""
-SKIP = 0.006
-"""Time after the stop that is ignored [s], since the end of the deceleration ramp is no ring-down."""
+SKIP = 0.006  # ignored time after the stop, when the deceleration still ends [s]
 WINDOW = 0.5  # duration of the first fit [s]
 LEAST_R_SQUARED = 0.2
 """Smallest share of the signal's energy that a fit must explain [-]; a fit of pure noise explains a tenth."""
 WINDOWS = (0.2, 1.0)  # shortest and longest duration of the final fit [s]
 CERTAIN = 1.96  # half-width of a 95 % interval over its standard error [-]
-SIGNIFICANT = 36.0
-"""Gain of n ln SSE that noise exceeds in less than one fit of a hundred, at 100 to 500 Hz [-]."""
-CORRELATED = 0.02
-"""Time over which the residual of a fit may be correlated, for example by an unmodelled mode [s]."""
+SIGNIFICANT = 36.0  # gain of n ln SSE that noise exceeds in less than 1 % of fits [-]
+CORRELATED = 0.02  # time over which the residual of a fit may be correlated [s]
 MAX_CORRELATION = 0.97  # largest assumed correlation; beyond it, a residual is a drift [-]
 COLOURS = 4  # order of the autoregression that describes the spectrum of a residual
 
@@ -289,8 +285,7 @@ class Ring:
 
     def _score_covariance(self, jacobian: Floats, left: Floats) -> Floats:
         """Return the covariance of the residual's part in the direction of each parameter, shape (P, P)."""
-        axes = self.alpha.shape[1]
-        scores = (jacobian * left[:, None]).reshape(-1, axes, jacobian.shape[1]).sum(axis=1)
+        scores = (jacobian * left[:, None]).reshape(-1, self.alpha.shape[1], jacobian.shape[1]).sum(axis=1)
         total = scores.T @ scores
         lags = round(CORRELATED / self.period)
         for lag in range(1, lags + 1):

@@ -17,10 +17,8 @@ LOUD = 4.0  # level relative to that of the quietest tenth of a log from which s
 ONSET = 0.25  # longest time from the start of a vibration to its peak in a ring-down [s]
 SWEEP, BLOCK = 3.0, 0.5  # shortest sweep, and duration of its parts, each with one frequency [s]
 RISING = 0.8  # smallest rank correlation of these frequencies with time [-]
-EDGE = 1.1
-"""Smallest ratio of a mode to the lowest frequency of a sweep, and of the highest frequency to the mode [-]."""
-EXPLAINED = 0.8
-"""Smallest share of the energy that damped sines must explain [-]; they explain less of a robot's motion."""
+EDGE = 1.1  # smallest ratio of a mode to the ends of a sweep [-]
+EXPLAINED = 0.8  # smallest share of the energy that damped sines must explain [-]
 SCALED = 15.0  # frequency in the middle of the fit's range to which the strongest one is scaled [Hz]
 
 

@@ -27,8 +27,7 @@ IMPACTS = {
     "cycle": "cycle_ms",
     "overshoot": "overshoot_m",
     "residual_vibration": "residual_vibration_m_s2",
-}
-"""Impacts listed in the paper, and their columns."""
+}  # impacts listed in the paper, and their columns
 
 SKIP_OF_MEASURED = 0.03
 """Time after a stop found in measured angles that the ring-down ignores [s]: the stop may be too early."""

@@ -84,8 +84,7 @@ def parts(time: Floats) -> list[slice]:
 
 def band_pass(signal: Floats, period: float) -> Floats:
     """Band-pass filter a signal with zero phase (Butterworth, forwards and backwards)."""
-    band = (BAND[0], min(BAND[1], 0.45 / period))
-    return _both_ways(_designed(2, band, "bandpass", 1.0 / period), signal)
+    return _both_ways(_designed(2, (BAND[0], min(BAND[1], 0.45 / period)), "bandpass", 1.0 / period), signal)
 
 
 @lru_cache(maxsize=16)

@@ -135,11 +135,11 @@ def read_baseline(path: Path, files: Sequence[str]) -> Mapping[str, Run]:
     ) as error:  # fmt: skip
         raise BaselineError(f"baseline {path} is not what tvist run --lockstep --json prints") from error
     if in_real_time:
-        raise BaselineError(f"baseline {path} is of a run in real time: make it with --lockstep")
+        raise BaselineError(f"baseline {path} is of a run in real time: record it with --lockstep")
     if set(runs) != set(files):
         was = ", ".join(map(str, runs)) or "nothing"
         raise BaselineError(
-            f"baseline {path} is of {was}, and this run is of {', '.join(files)}: give the same"
+            f"baseline {path} is of {was}, this run is of {', '.join(files)}: run the same programs"
         )
     return runs
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 from xml.etree import ElementTree as ET
 
+from tvist_lab.phrases import counted
 from tvist_lab.programs.watch import Fastest, ProgramMessage, ProgramMove, ProgramWatch
-from tvist_lab.words import counted
 from tvist_plant.plant import PERIOD
 from tvist_protocol.errors import harmless
 
@@ -105,10 +105,9 @@ def junit(results: Sequence[Mapping[str, Any]]) -> bytes:
     """Convert what --json prints of programs to JUnit XML: a test suite with a case for each."""
     # A case has the robot's time, measurements as properties, a sentence for each failure, the program's
     # messages in `system-out` and warnings in `system-err`.
-    failed = sum(not result["ok"] for result in results)
     counts = {
         "tests": str(len(results)),
-        "failures": str(failed),
+        "failures": str(sum(not result["ok"] for result in results)),
         "errors": "0",
         "skipped": "0",
         "time": f"{sum(result.get('seconds', 0.0) for result in results):.3f}",

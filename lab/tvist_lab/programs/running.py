@@ -14,7 +14,7 @@ from tvist_plant.foreign import check_unpaced
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import Command, KeepAlive, TakeControl
 from tvist_protocol.errors import RefusedError
-from tvist_protocol.io import SetRegisters, SimulationSetInputs
+from tvist_protocol.io import Bank, SetRegisters, SimulationSetInputs
 from tvist_protocol.programs import ProgramClosePopup, ProgramRun
 from tvist_protocol.replies import Accepted, Refused, Reply
 from tvist_server.config import ServeConfig
@@ -27,8 +27,7 @@ from tvist_server.shutdown import Shutdown
 CLIENT: Final = "tvist run"
 LEASE: Final = 3600.0  # time without renewal after which a run loses control [s]
 HERE: Final = "127.0.0.1"
-ATTEND_TICKS, ATTEND_S = 50, 0.05
-"""Ticks in lockstep, or time in real time [s], between two calls of `attend`."""
+ATTEND_TICKS, ATTEND_S = 50, 0.05  # ticks, or time [s], between two calls of `attend`
 LEAST, MOST = -(2**31), 2**31 - 1
 _INPUT = re.compile(r"(?P<name>digital_input|input_(?P<kind>bit|int|double)_register)_(?P<number>\d{1,3})")
 _BITS = {"0": False, "false": False, "off": False, "1": True, "true": True, "on": True}
@@ -67,8 +66,8 @@ def run_in_lockstep(
     sinks: list[Sink] = [watch]
     with ExitStack() as ends:
         if record is not None:
-            start_of_it = controller.setup.to_builtins()
-            recorder = Recorder(record, info_of(controller), start_of_it, wait=True, on_error=on_record_error)
+            start = controller.setup.to_builtins()
+            recorder = Recorder(record, info_of(controller), start, wait=True, on_error=on_record_error)
             sinks.insert(0, ends.enter_context(recorder))
         host = Host(controller, *sinks, learning=payload_learning_of(controller.setup))
         try:
@@ -117,8 +116,7 @@ class ProgramServer:
         (self._robot,) = self.server.robots
         try:
             # Local clients of UR's interfaces share control of the program, as if one of them had started it.
-            client = f"ur-{HERE}" if config.ur else CLIENT
-            self._token = _start(self._robot.request, text, inputs, client)
+            self._token = _start(self._robot.request, text, inputs, f"ur-{HERE}" if config.ur else CLIENT)
             self.server.share_control(HERE, self._token)
         except BaseException:
             self.server.discard()
@@ -146,10 +144,7 @@ class ProgramServer:
             self.watch.end("signal", f"{self._ending.signal.name} ended the run")
 
     def _close_popup(self) -> None:
-        def close() -> None:
-            self._robot.request(ProgramClosePopup())
-
-        self._robot.driven.post(close)
+        self._robot.driven.post(lambda: self._robot.request(ProgramClosePopup()))
 
 
 def _start(
@@ -179,36 +174,28 @@ def input_command(text: str, token: str) -> SetRegisters | SimulationSetInputs:
             "input_int_register_N or input_double_register_N"
         )
     number = int(found["number"])
-    match found["kind"]:
-        case None:
-            if number > 17:
-                raise InputError(f"input is {text!r}: there are digital inputs 0 to 17")
-            bit = 1 << number
-            return SimulationSetInputs(
-                token=token, digital_input_mask=bit, digital_inputs=bit if _bit(text, value) else 0
-            )
-        case "bit":
-            return SetRegisters(token=token, bank="input_bit", values=(_bit(text, value),), first=number)
-        case "int":
-            return SetRegisters(token=token, bank="input_int", values=(_whole(text, value),), first=number)
+    bank, convert, requirement = _BANKS[found["kind"] or "bit"]
     try:
-        return SetRegisters(token=token, bank="input_double", values=(float(value),), first=number)
-    except ValueError:
-        raise InputError(f"input is {text!r}: the value must be a number") from None
+        converted = convert(value.lower())
+    except (KeyError, ValueError):
+        raise InputError(f"input is {text!r}: the value must be {requirement}") from None
+    if found["kind"] is not None:
+        return SetRegisters(token=token, bank=bank, values=(converted,), first=number)
+    if number > 17:
+        raise InputError(f"input is {text!r}: N of digital_input_N must be from 0 to 17")
+    bit = 1 << number
+    return SimulationSetInputs(token=token, digital_input_mask=bit, digital_inputs=bit if converted else 0)
 
 
-def _bit(text: str, value: str) -> bool:
-    found = _BITS.get(value.lower())
-    if found is None:
-        raise InputError(f"input is {text!r}: the value must be 0 or 1")
-    return found
-
-
-def _whole(text: str, value: str) -> int:
-    try:
-        number = int(value)
-    except ValueError:
-        raise InputError(f"input is {text!r}: the value must be a whole number") from None
+def _whole(value: str) -> int:
+    number = int(value)
     if not LEAST <= number <= MOST:
-        raise InputError(f"input is {text!r}: the value must be from {LEAST} to {MOST}")
+        raise ValueError
     return number
+
+
+_BANKS: dict[str, tuple[Bank, Callable[[str], float], str]] = {
+    "bit": ("input_bit", _BITS.__getitem__, "0 or 1"),
+    "int": ("input_int", _whole, f"a whole number from {LEAST} to {MOST}"),
+    "double": ("input_double", float, "a number"),
+}  # bank of registers, conversion of a value, and what the value must be, by kind

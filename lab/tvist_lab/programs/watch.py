@@ -56,8 +56,7 @@ class ProgramMove:
     line: int = 0  # line of the program that started it; 0 if none
     ended: int | None = None  # tick of its end; None if the run ended first
     stopped: str | None = None  # why it was stopped before its target; None if it was not
-    rests: int | None = None
-    """Tick at which the shaped reference came to rest; None if not before the next motion."""
+    rests: int | None = None  # tick at which the shaped reference came to rest, if before the next
     followed: int | None = None  # tick at which the next motion started; None if none did
     rested: int = 0  # ticks of rest after it, as far as the vibration is measured
     peak_so_far: float | None = None  # largest tool acceleration measured until now [m/s²]; None if none was

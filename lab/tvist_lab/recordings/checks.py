@@ -25,8 +25,7 @@ LARGEST = {TIME: 1e10, "tick": 2.0**53}
 MEASURED = re.compile(
     r"(actual|target|shaped|reference|unshaped|motor|truth)_(motor_)?(q|qd|qdd|moment|current|(TCP|tool|flange)_\w+)(_\d+)?"
     r"|(estimated|flange|payload|shaper|speed_scaling|truth_\w*(deflection|poses))\w*"
-)
-"""Names of columns in SI units."""
+)  # names of columns in SI units
 MAX_VALUE = 1e6  # largest number in such a column; more is damage
 LONG_GAP = 1.0  # longest gap between rows that is filled with straight lines [s]; a longer one splits the log
 Places = tuple[str, Floats]
@@ -36,8 +35,7 @@ DENSEST = (
     100  # largest ratio of the content of a packed log to its size; logs reach 30, a malicious file 1000
 )
 MIN_CONTENT = 1 << 20  # size of the content that any file may have [bytes]
-PERIODS = (1e-4, 0.1)
-"""Shortest and longest time between rows [s]; others are not in seconds, or too slow for vibration."""
+PERIODS = (1e-4, 0.1)  # shortest and longest time between rows [s]
 
 
 class LogError(RecordingError):
@@ -72,7 +70,7 @@ def check_names(where: object, names: Sequence[str]) -> None:
     """Refuse a name that cannot be printed, as in a damaged file."""
     for name in names:
         if not is_name(name):
-            raise LogError(f"{where}: {quoted(name)} is no column's name: it must be short and printable")
+            raise LogError(f"{where}: {quoted(name)} is no name of a column: must be short and printable")
 
 
 def check_numbers(path: Path, columns: Mapping[str, Floats], places: Places) -> None:
@@ -83,7 +81,7 @@ def check_numbers(path: Path, columns: Mapping[str, Floats], places: Places) -> 
             row, *entry = strange[0].tolist()
             where = f"{path}, {places[0]} {places[1][row]:.0f}, column {'_'.join([name, *map(str, entry)])}"
             raise LogError(
-                f"{where}: {values[(row, *entry)]:g} in SI units is no number of a robot: at most {most:g}"
+                f"{where}: {values[(row, *entry)]:g} in SI units is not plausible: must be at most {most:g}"
             )
 
 

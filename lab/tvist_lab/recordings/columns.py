@@ -17,8 +17,7 @@ SHORT = {
     "accelerometer": ACCELEROMETER,
     "gyroscope": GYROSCOPE,
     "pose": "actual_TCP_pose",
-}
-"""RTDE's names of the most important columns, by short name."""
+}  # RTDE's names of the most important columns, by short name
 AXES = {"x": 0, "y": 1, "z": 2}  # Letters that may replace the number in the name of a vector's column
 SI = {
     "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "rad": 1.0, "deg": np.pi / 180.0, "m/s2": 1.0, "mm/s2": 1e-3,
@@ -38,8 +37,7 @@ REALTIME = {
     "tool_vector_actual": "actual_TCP_pose",
     "TCP_speed_actual": "actual_TCP_speed",
     "tool_accelerometer": "actual_tool_accelerometer",
-}
-"""RTDE's names for those of UR's real-time interface."""
+}  # RTDE's names for those of UR's real-time interface
 VENDORS = {
     # franka::logToCSV, github.com/frankaemika/libfranka, src/log.cpp
     "Franka's libfranka": "q=state.q[{}]:rad,target_q=state.q_d[{}]:rad,qd=state.dq[{}],target_qd=state.dq_d[{}]",

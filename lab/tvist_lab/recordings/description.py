@@ -116,8 +116,7 @@ def width_of(values: Floats) -> int | None:
 def ordered(recording: Recording) -> dict[str, Floats]:
     """Return the columns with `timestamp` first, if there is one."""
     columns = dict(recording.columns)
-    first = {"timestamp": columns.pop("timestamp")} if "timestamp" in columns else {}
-    return first | columns
+    return ({"timestamp": columns.pop("timestamp")} if "timestamp" in columns else {}) | columns
 
 
 def describe(recording: Recording) -> bytes:

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import numpy as np
 
+from tvist_lab.phrases import counted
 from tvist_lab.recordings.checks import ACCELEROMETER, GYROSCOPE, TIME
 from tvist_lab.recordings.read import read
 from tvist_lab.recordings.recording import Floats, Recording, RecordingError
 from tvist_lab.recordings.table import SENSOR, ticks_of
 from tvist_lab.recordings.two_clocks import RATE, BodyFrameSignal, Clocks, at_flange, by_sensor, fits
-from tvist_lab.words import counted
 from tvist_plant.description import DescriptionError, RobotDescription, load, robots
 from tvist_plant.user_file import UserFileError
 
@@ -21,15 +21,13 @@ OFFSET, DRIFT = 2.5e-3, 2e-4  # largest half intervals of the offset [s] and of 
 MOVED = {
     False: (0.3, "the flange turns by {:.2g} rad in all"),
     True: (3.0, "its force changes by {:.2g} m/s² in all"),
-}
-"""Smallest motion of a log and its description, for rotation (False) and force (True)."""
+}  # smallest motion of a log and its description, for rotation (False) and force (True)
 SIZES = (0.8, 1.25)  # range of the ratio of the joints' motion to the sensor's [-]
 DEFAULT = "ur5e"
 REMEDY = (
     "record both at once for 20 s or more, the sensor fixed to the tool: fast motions of several joints, others at the "
     "end than at the beginning, and 5 s of rest before and after them"
-)
-"""Advice that makes a join possible."""
+)  # advice that makes a join possible
 
 
 class JoinError(RecordingError):
@@ -108,7 +106,7 @@ def _told(imu: Path, felt: BodyFrameSignal, sensor: Recording, *, force: bool) -
     else:
         most = f"{found[0].correlation:.2f} at best" if found else "none"
         raise JoinError(
-            f"{imu} cannot be joined: it and the joint angles do not show one motion (correlation {most}, needed "
+            f"{imu} cannot be joined: its motion is not that of the joint angles (correlation {most}, needed "
             f"{CORRELATED:g}). Is --robot right, and are the units? If so, {REMEDY}"
         )
     best, *others = found
@@ -117,7 +115,7 @@ def _told(imu: Path, felt: BodyFrameSignal, sensor: Recording, *, force: bool) -
         if as_well and other.explained >= AS_WELL * best.explained:
             apart = abs(other.offset(best.middle) - best.offset(best.middle))
             raise JoinError(
-                f"{imu} cannot be joined: motions repeat, so that its clock may as well be {apart:.2f} s off: {REMEDY}"
+                f"{imu} cannot be joined: the motions repeat, so its clock may be off by {apart:.2f} s: {REMEDY}"
             )
     offset, drift = best.half
     if offset > OFFSET or drift > DRIFT:

@@ -44,8 +44,7 @@ class RecordingFile:
     path: Path  # file, folder or pattern that names the recording
     files: tuple[Path, ...]
     robot: str
-    info: Info | None
-    """Description of the robot when the recording started; None in a file of another program."""
+    info: Info | None  # description of the robot at the start; None in a foreign file
     start: dict[str, Any] | None  # start options of the robot's server; None in a file of another program
     behaviour: int  # number of the robot's behaviour, see `tvist_protocol.recorded.THIS_BEHAVIOUR`
     counts: Mapping[str, int]  # number of messages `state`, `truth` and `io`; at least one state
@@ -55,8 +54,7 @@ class RecordingFile:
     from_tick: int | None
     """First tick of a recording without the earlier ones; None if it started with the robot's first tick."""
     complete: bool  # whether the file was closed properly and read to its end
-    dropped: Mapping[str, int] | None
-    """Number of messages that the recorder dropped, by kind; None if unknown."""
+    dropped: Mapping[str, int] | None  # dropped messages by kind; None if unknown
     note: str | None  # note if something is missing
 
     @cached_property
@@ -141,8 +139,7 @@ class _Content:
     robot: str | None = None
     damage: str | None = None
     channels: dict[int, str] = field(default_factory=dict)
-    waiting: list[tuple[str, bytes]] = field(default_factory=list)
-    """Messages that are not yet decoded, in order."""
+    waiting: list[tuple[str, bytes]] = field(default_factory=list)  # messages still to decode
 
     def read(self, streams: Sequence[IO[bytes]]) -> None:
         try:

@@ -102,7 +102,7 @@ class Recording:
     def period(self) -> float:
         """Time between ticks [s]."""
         if len(self) < 2:
-            raise RecordingError("the period of a recording shows from two states on")
+            raise RecordingError("a recording needs two states to have a period")
         tick, time = self["tick"], self.time
         return float((time[-1] - time[0]) / (tick[-1] - tick[0]))
 
@@ -114,8 +114,7 @@ class Recording:
 
     def between(self, first_tick: int, last_tick: int) -> "Recording":
         """Return the rows and events in a range of ticks, including both ends."""
-        tick = self["tick"]
-        first, past = np.searchsorted(tick, [first_tick, last_tick + 1])
+        first, past = np.searchsorted(self["tick"], [first_tick, last_tick + 1])
         if past <= first:
             raise RecordingError(f"no state between ticks {first_tick} and {last_tick}")
         columns = {name: column[first:past] for name, column in self.columns.items()}

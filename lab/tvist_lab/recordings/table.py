@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from tvist_lab.phrases import counted
 from tvist_lab.recordings import checks
 from tvist_lab.recordings.checks import ACCELEROMETER, TIME, WIDTHS, LogError, is_measured
 from tvist_lab.recordings.columns import TIMES, found_columns, in_si, rtde_names
 from tvist_lab.recordings.description import Description
 from tvist_lab.recordings.recording import Floats, Recording, RecordingError
-from tvist_lab.words import counted
 from tvist_plant.user_file import is_name
 
 OURS = ("tick", "reference_q", "unshaped_q", "target_q", "actual_TCP_pose")
@@ -49,8 +49,7 @@ class LogTable:
     """Numbers of a log as stored in its file."""
 
     path: Path
-    names: Sequence[str]
-    """Column names; those of a vector end in `_0`, `_1`, …; empty if the file has no header."""
+    names: Sequence[str]  # those of a vector end in `_0`, `_1`, …; empty without a header
     values: Floats  # shape (T, columns); NaN for an empty cell
     lines: Floats  # number of the line, row or packet of each row, shape (T,)
     unit: str = "row"  # what `lines` counts, for messages
@@ -64,8 +63,7 @@ class LogTable:
 
 
 Reader = Callable[[Path], LogTable | Recording]
-READERS: dict[str | bytes, Reader] = {}
-"""Readers by file ending or first bytes, or `BINARY` and `TEXT` for other files."""
+READERS: dict[str | bytes, Reader] = {}  # readers by file ending, first bytes, `BINARY` or `TEXT`
 BINARY, TEXT = "binary", "text"
 
 
@@ -222,8 +220,7 @@ def _increasing(table: LogTable, time: Floats) -> tuple[NDArray[np.intp], list[s
         notes.append(_left_out(table, len(time) - len(timed), f"without {TIME}", first))
     step = np.diff(time[timed])
     order = np.argsort(time[timed], kind="stable")
-    away = np.abs(order - np.arange(len(order)))
-    if 0 < np.max(away, initial=0) <= SWAPPED:
+    if 0 < np.max(np.abs(order - np.arange(len(order))), initial=0) <= SWAPPED:
         first = int(table.lines[timed[np.flatnonzero(step < 0.0)[0] + 1]])
         notes.append(
             f"{counted(int(np.count_nonzero(step < 0.0)), 'row')} out of order sorted by {TIME}, the first in "

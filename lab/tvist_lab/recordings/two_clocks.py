@@ -26,8 +26,7 @@ dominates the force at 10 Hz, while a gyroscope's bias wanders slowly."""
 GRAVITY = np.array([0.0, 0.0, 9.80665])
 AT_REST = 0.2  # share of a log in which the arm is assumed to rest [-]
 SPARSE = 10.0  # duration of a log relative to that of its rows from which it is mostly gaps [-]
-HELD = 0.05
-"""Longest time for which a log repeats angles between two measurements [s]; if longer, the arm rests."""
+HELD = 0.05  # longest time between two measurements of an arm that moves [s]
 DRIFT = 0.02  # largest drift in the search [-]
 COARSE = 5  # reduction of rows for the search: one of this number is used
 BLURRED = 0.2  # time by which a drift may be wrong between the ends of a log in the search [s]
@@ -36,8 +35,7 @@ APART = 0.25  # difference from which offsets are distinct [s]; the step of a fi
 BLOCK = 0.5  # time after which residuals of a fit count as independent [s]
 HUBER = 2.0  # residuals beyond this multiple of the median have less weight (Huber 1964)
 RANK = 1e-9  # share of the largest eigenvalue below which parameters cannot be separated [-]
-MOVING = 1e-3
-"""Smallest weight of a block, relative to the largest, to contain information about the clocks [-]."""
+MOVING = 1e-3  # smallest weight of an informative block, relative to the largest [-]
 ITERATIONS = 15
 CONVERGED = 1e-5  # change of the offset anywhere in a log at which a fit ends [s]
 TURN, BIAS, LEVER = slice(2, 5), slice(5, 8), slice(8, None)
@@ -79,8 +77,7 @@ def at_flange(robot: RobotDescription, time: Floats, q: Floats, *, force: bool) 
     step = grid[1] - grid[0]
     arm = Arm(robot)
     rotation, position, jacobian = map(np.array, zip(*(arm.located(row) for row in angles), strict=True))
-    speeds = np.gradient(angles, step, axis=0)
-    omega = np.einsum("tji,tjk,tk->ti", rotation, jacobian[:, 3:], speeds)
+    omega = np.einsum("tji,tjk,tk->ti", rotation, jacobian[:, 3:], np.gradient(angles, step, axis=0))
     if not force:
         return _smoothed(grid, omega, known, np.zeros((len(grid), 3, 0)))
     pull = np.gradient(np.gradient(position, step, axis=0), step, axis=0) + GRAVITY
@@ -134,12 +131,10 @@ class Clocks:
     middle: float  # middle of the common time, on the first clock [s]
     other: float  # time of the other clock then [s]
     drift: float  # relative speed of the other clock, minus 1 [-]
-    half: tuple[float, float]
-    """Half of the 95 % interval of the offset, at its wider end [s], and of the drift [-]."""
+    half: tuple[float, float]  # half of the 95 % intervals of the offset [s] and the drift [-]
     correlation: float  # correlation of the vectors after rotation [-]
     scale: float  # size of the first vector relative to the other [-]
-    explained: float
-    """Energy of the first vector's changes that the other explains [its unit squared times s]."""
+    explained: float  # energy of the first vector's changes that the other explains
     span: tuple[float, float]  # first and last common time, on the first clock [s]
 
     def first(self, other: Floats) -> Floats:

@@ -41,12 +41,11 @@ def modes_rows(advice: Advice) -> list[tuple[str, ...]]:
 def option_rows(advice: Advice) -> list[tuple[str, ...]]:
     """Return the rows of the table of shapers, the recommended one first, then by settling time."""
     best = [] if advice.best is None else [advice.best]
-    shown = [*best, *(one for one in advice.options if one is not advice.best)][:SHOWN]
     return [
         (f"{one.name}{'' if one.keeps_limits else ' *'}", one.aim.scope, f"{1e3 * one.added_s:.0f}",
          f"{one.left_percent:.0f}", "–" if one.modes_percent is None else f"{one.modes_percent:.0f}",
          f"{1e3 * one.still_s:.0f}" if math.isfinite(one.still_s) else "–")
-        for one in shown
+        for one in [*best, *(one for one in advice.options if one is not advice.best)][:SHOWN]
     ]  # fmt: skip
 
 

@@ -22,11 +22,11 @@ from tvist_lab.metrics import (
     pairs,
 )
 from tvist_lab.metrics.columns import number, percent
+from tvist_lab.phrases import counted
 from tvist_lab.recordings import Recording, read
 from tvist_lab.recordings.mcap_records import files_of
 from tvist_lab.report.page import PageTable, Picture, ReportPage, Section, picture
 from tvist_lab.report.verdict import shaping_of, verdict_on_one, verdict_on_pairs, verdict_on_two
-from tvist_lab.words import counted
 
 PAIRED = ("motion", "shaper", "without\nm/s²", "with\nm/s²", "less\n%", "at rest\nms earlier", "longer\nΔ ms")
 """Columns of the table of motions that were made without and with a shaper."""
@@ -39,8 +39,7 @@ OF_PAIRS = {
     "without": "Largest acceleration of the tool after the unshaped motion, later than 10 ms after its stop.",
     "with": "The same after the shaped motion.",
     "less": "By how much it is less.",
-}
-"""Meaning of columns that the table of motions does not explain."""
+}  # meaning of columns that the table of motions does not explain
 WITHOUT = "without a shaper"
 PICTURES = 6  # largest number of motions in the figures
 
@@ -200,17 +199,12 @@ def _missing(files: Sequence[_File], panels: Sequence[ComparedPanel]) -> list[st
     return items
 
 
-def _sha256(path: Path) -> str:
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
-
-
 def _provenance(file: _File) -> Mapping[str, str]:
     recording = file.measured.recording
     facts = {"File": str(file.path)}
     there = [place for place in files_of(file.path) if place.is_file()]
     if there:
-        facts["SHA-256"] = ", ".join(_sha256(place) for place in there)
+        facts["SHA-256"] = ", ".join(hashlib.sha256(place.read_bytes()).hexdigest() for place in there)
         facts["Size"] = f"{sum(place.stat().st_size for place in there)} bytes"
     facts["Rows"] = (
         f"{len(recording)}, one every {1e3 * recording.period:g} ms, from {recording.time[0]:.3f} to "

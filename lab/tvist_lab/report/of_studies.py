@@ -1,10 +1,10 @@
 """The web page of a study: verdict, tables, figures and explanations."""
 
 from tvist_lab.figures import study_figure
+from tvist_lab.phrases import QUANTILES_FROM, counted
 from tvist_lab.report.page import PageTable, ReportPage, Section, picture
 from tvist_lab.study.columns import ResultTable, cells, meanings, titles
 from tvist_lab.study.study import Figures, Result
-from tvist_lab.words import QUANTILES_FROM, counted
 
 LISTED = 200  # largest number of motions that are listed
 

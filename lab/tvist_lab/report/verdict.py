@@ -8,7 +8,7 @@ from statistics import median
 
 from tvist_lab.metrics import Comparison, MotionPair, MotionResult
 from tvist_lab.metrics.comparison import TICK_MS
-from tvist_lab.words import counted, either, sample, spread
+from tvist_lab.phrases import counted, either, sample, spread
 
 NOTICEABLE = 0.15  # vibration that exceeds the sensor's noise [m/s²]
 CLEAR = 15.0  # smallest change that counts as a difference [%]; equal runs differ by noise

@@ -18,8 +18,8 @@ from tvist_lab.study.foreign import FromFile
 from tvist_lab.study.held_out import MIN_MOVES
 from tvist_lab.study.line import round_a_corner
 from tvist_lab.study.measures import WORTH
-from tvist_lab.study.menus import UNSHAPED
 from tvist_lab.study.method import Method, Named, Planned, Task
+from tvist_lab.study.method_list import UNSHAPED
 from tvist_lab.study.moves import Move
 from tvist_lab.study.request import Preset, StudyRequest
 from tvist_lab.study.shaping import ShaperFaultError
@@ -37,8 +37,7 @@ STICKING = (
 PAYLOAD_ERRORS = (0.0, 0.1, -0.1)  # errors of the declared mass [-]
 CORNERS = 5  # number of curved paths
 KEPT = 1.003  # largest ratio of a peak to its limit that counts as within the limit [-]
-ONCE = pl.col("arm") == pl.col("arm").first()
-"""Selects the rows of the first arm, since the reference is the same for all."""
+ONCE = pl.col("arm") == pl.col("arm").first()  # the reference is the same for all arms
 
 
 def _time(of: float, called: str) -> pl.Expr:
@@ -115,8 +114,7 @@ def _beside_waiting(rows: pl.DataFrame) -> pl.DataFrame:
     """Add to each row the results of waiting with the same move on the same arm."""
 
     def waited(name: str) -> pl.Expr:
-        of = pl.col(name).filter(pl.col("shaper") == UNSHAPED).first()
-        return of.over("move", "payload_error", "arm")
+        return pl.col(name).filter(pl.col("shaper") == UNSHAPED).first().over("move", "payload_error", "arm")
 
     before = waited("residual_m_s2")
     return rows.with_columns(
@@ -263,4 +261,4 @@ def path_error(path: Floats, q: Floats) -> float:
     return math.sqrt(largest)
 
 
-PRESET = Preset(study, always=(UNSHAPED,), menu="bench", options=frozenset(("quick",)))
+PRESET = Preset(study, always=(UNSHAPED,), defaults="bench", options=frozenset(("quick",)))

@@ -15,7 +15,7 @@ from tvist_plant.plant import PERIOD
 
 PLACES = (0.15, 0.5, 0.8)  # positions from which the references differ, as shares of the motion [-]
 ELSEWHERE = 1.0  # acceleration with which the other reference deviates [rad/s²]
-TWICE = "gives another output when the same reference is run again: it keeps something, or draws by chance"
+TWICE = "gives another output when the same reference is run again: it keeps state or uses random numbers"
 
 
 def inspect(method: Method, description: RobotDescription, moves: Sequence[Move]) -> str | None:
@@ -44,11 +44,10 @@ def check_causal(method: Method, task: Task) -> None:
             apart = np.flatnonzero((first[: tick + 1] != other[: tick + 1]).any(axis=1))
             if apart.size:
                 raise ShaperFaultError(
-                    f"peeks at the future: references that are equal up to tick {tick} give other outputs from tick "
+                    f"uses future samples: references that are equal up to tick {tick} give other outputs from tick "
                     f"{apart[0]} on"
                 )
-    again = _outputs(method, task)
-    if not np.array_equal(first, again):
+    if not np.array_equal(first, _outputs(method, task)):
         raise ShaperFaultError(TWICE)
 
 

@@ -12,13 +12,13 @@ import numpy as np
 import polars as pl
 from scipy.stats import binom
 
+from tvist_lab.phrases import counted
 from tvist_lab.recordings import Floats
 from tvist_lab.study.arms import JUDGED
 from tvist_lab.study.columns import Column, of_group, share
 from tvist_lab.study.held_out import MIN_MOVES, bootstrap
 from tvist_lab.study.request import Preset, StudyRequest
 from tvist_lab.study.study import Study, StudyError
-from tvist_lab.words import counted
 from tvist_plant.variants import variant
 
 NEITHER, TOO_FEW = "no difference shown", "too few moves vibrate"

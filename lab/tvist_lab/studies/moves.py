@@ -5,15 +5,15 @@ from typing import Any
 
 import polars as pl
 
+from tvist_lab.phrases import QUANTILES_FROM, either, sample, spread
 from tvist_lab.study.arms import AS_DESCRIBED
 from tvist_lab.study.columns import Column, ResultTable, highest, lowest, median, p5, p90, share
-from tvist_lab.study.held_out import sure
+from tvist_lab.study.held_out import interval_of
 from tvist_lab.study.measures import WORTH
 from tvist_lab.study.method import WaitingMethod
 from tvist_lab.study.request import Preset, StudyRequest
 from tvist_lab.study.study import Figures, Result, Study
 from tvist_lab.study.work import MEASURED, record
-from tvist_lab.words import QUANTILES_FROM, either, sample, spread
 
 COUNTED = pl.col("reduction_percent").is_not_null()  # selects rows with enough vibration for a percentage
 LESS = "Reduction of the largest acceleration of the tool, later than 10 ms after the reference stops."
@@ -34,7 +34,7 @@ COLUMNS = (
     Column("still\np90 ms", p90("still_after_unshaped_stop_ms"), 0), DRIVEN,
 )  # fmt: skip
 MORE = (
-    Column("95 % interval\nof the median", sure("reduction_percent", 50, "median"), 1,
+    Column("95 % interval\nof the median", interval_of("reduction_percent", 50, "median"), 1,
            meaning="Bootstrap over the moves, of the median of less."),
     Column("quiet\nmedian ms", median("quiet_after_unshaped_stop_ms"), 0, meaning="As still, but of 0.02 m/s²."),
     Column("peak\nmedian m/s²", share("shaped_peak_m_s2", 0.5, "median", among=COUNTED), 3,
@@ -55,7 +55,7 @@ EACH = (
     Column("largest q̈\nof its limit", "peak_acceleration_ratio", 3),
 )  # fmt: skip
 SUMMED = (
-    COUNTED.sum().alias("counted"), sure("reduction_percent", 5, "p5"),
+    COUNTED.sum().alias("counted"), interval_of("reduction_percent", 5, "p5"),
     *(share("shaped_peak_m_s2", of, name, among=COUNTED) for name, of in (("p95", 0.95), ("max", 1.0))),
     pl.col("shaped_peak_m_s2").filter(~COUNTED).max().alias("left_out_largest_peak_m_s2"),
     *(of(name) for name in ("peak_acceleration_ratio", "peak_velocity_ratio") for of in (median, p90)),
@@ -172,7 +172,7 @@ def example(moves: Sequence[Mapping[str, Any]]) -> int:
 PRESET = Preset(
     study,
     shapers=("zv",),
-    menu="baselines",
+    defaults="baselines",
     options=frozenset(("plants", "limits", "streams", "modes", "frequency_error", "payload_error", "stiffness_error")),
     modal=False,
 )  # fmt: skip

@@ -8,7 +8,7 @@ import polars as pl
 from tvist_lab.study.arms import AS_DESCRIBED, PERTURBED, with_springs
 from tvist_lab.study.case import Case
 from tvist_lab.study.columns import Column, ResultTable, across, median, p5
-from tvist_lab.study.held_out import MIN_MOVES, sure
+from tvist_lab.study.held_out import MIN_MOVES, interval_of
 from tvist_lab.study.measures import QUIET_LEVEL
 from tvist_lab.study.request import Preset, StudyRequest
 from tvist_lab.study.study import Figures, Result, Study
@@ -54,7 +54,7 @@ def study(asked: StudyRequest) -> Study:
         columns=(LESS, WORST, DELAY),
         more=(
             pl.col("reduction_percent").count().alias("counted"),
-            sure("reduction_percent", 50.0, "median"), sure("reduction_percent", 5.0, "p5", MIN_MOVES),
+            interval_of("reduction_percent", 50.0, "median"), interval_of("reduction_percent", 5.0, "p5", MIN_MOVES),
             BEYOND.filter(WAITED).median().alias("beyond_waiting_percent_median"),
             pl.when(WAITED.sum() >= MIN_MOVES).then(BEYOND.filter(WAITED).quantile(0.05, "linear"))
             .alias("beyond_waiting_percent_p5"),
@@ -72,11 +72,10 @@ def study(asked: StudyRequest) -> Study:
 
 def errors(named: Sequence[Variant] = ()) -> dict[str, dict[str, tuple[Variant, float]]]:
     """Return the columns of each kind of table by title: the arm, and the error of the declared mass [-]."""
-    plants = [*map(variant, PERTURBED), *named]
     return {
         "stiffness": {f"{100.0 * one:+.0f} %": (with_springs(1.0 + one), 0.0) for one in ERRORS["stiffness"]},
         "payload": {f"{100.0 * one:+.0f} %": (AS_DESCRIBED, one) for one in ERRORS["payload"]},
-        PLANT: {one.name: (one, 0.0) for one in plants},
+        PLANT: {one.name: (one, 0.0) for one in [*map(variant, PERTURBED), *named]},
     }
 
 
@@ -118,4 +117,4 @@ def _draw(result: Result) -> Figures:
     }
 
 
-PRESET = Preset(study, menu="robustness")
+PRESET = Preset(study, defaults="robustness")

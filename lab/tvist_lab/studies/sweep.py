@@ -84,8 +84,7 @@ class Spec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     @property
     def rows(self) -> int:
         """Number of rows."""
-        axes = (self.shapers, self.payloads, self.errors, self.robots)
-        return self.moves * math.prod(map(len, axes))
+        return self.moves * math.prod(map(len, (self.shapers, self.payloads, self.errors, self.robots)))
 
 
 def read_spec(path: Path) -> Spec:
@@ -109,7 +108,7 @@ def read_spec(path: Path) -> Spec:
         low, high = spec.stroke
         raise SpecError(f"sweep {path}{_line(text, 'stroke')}: stroke is {low:g} to {high:g}: must increase")
     if spec.rows > MOST_ROWS:
-        raise SpecError(f"sweep {path}: it has {spec.rows} rows: must have at most {MOST_ROWS}")
+        raise SpecError(f"sweep {path}: it has {spec.rows} rows: must be at most {MOST_ROWS}")
     return spec
 
 
@@ -118,7 +117,7 @@ def _check_different(path: Path, text: str, axis: str, values: tuple[object, ...
     for place, value in enumerate(values):
         if (first := places.setdefault(value, place)) != place:
             raise SpecError(
-                f"sweep {path}{_line(text, axis)}: {axis}[{place}] repeats {axis}[{first}]: each value counts once"
+                f"sweep {path}{_line(text, axis)}: {axis}[{place}] repeats {axis}[{first}]: values must differ"
             )
 
 
@@ -192,14 +191,6 @@ class Axes(Sequence[Case]):
 
 def study(spec: Spec, robots: Sequence[SweptRobot]) -> Study:
     """Return the study of a spec, with its robots loaded."""
-    contents = [
-        {
-            "model": robot.description.robot.model,
-            "sha256": digest(robot.description),
-            "calibration": robot.recipes[0].calibration and digest(robot.recipes[0].calibration),
-        }
-        for robot in robots
-    ]
     return Study(
         title="Sweep",
         cases=Axes(spec, robots),
@@ -213,7 +204,14 @@ def study(spec: Spec, robots: Sequence[SweptRobot]) -> Study:
         draw=_draw,
         identity={
             **msgspec.to_builtins(spec),
-            "contents of robots or calibrations": contents,
+            "contents of robots or calibrations": [
+                {
+                    "model": robot.description.robot.model,
+                    "sha256": digest(robot.description),
+                    "calibration": robot.recipes[0].calibration and digest(robot.recipes[0].calibration),
+                }
+                for robot in robots
+            ],
             "contents of shapers": [own.sha256 for recipe in robots[0].recipes for own in recipe.own],
         },
     )

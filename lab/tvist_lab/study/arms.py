@@ -1,7 +1,5 @@
 """The arms of studies: those of `tvist_plant.variants`, and the same in MuJoCo."""
 
-from dataclasses import dataclass
-
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.plant import SimulatedArm
 from tvist_plant.variants import AS_DESCRIBED, VARIANTS, Variant, scattered, stiffer, with_springs
@@ -12,7 +10,6 @@ __all__ = [
     "AS_DESCRIBED",
     "JUDGED",
     "PERTURBED",
-    "ArmVariant",
     "scattered",
     "stiffer",
     "with_springs",
@@ -23,17 +20,12 @@ PERTURBED = ("stribeck", "hysteresis", "torsion", "base", "backlash", "combined"
 JUDGED = ("calibrated", *PERTURBED, "springs-30", "springs+30")  # plants on which two methods are compared
 
 
-@dataclass(frozen=True)
-class ArmVariant(Variant):
-    """One of the arms of a study."""
-
-    in_mujoco: bool = False  # whether MuJoCo simulates it, without gear error
+class MujocoVariant(Variant):
+    """An arm that MuJoCo simulates, without gear error."""
 
     def make(self, description: RobotDescription, carried: Payload, seed: int) -> SimulatedArm:
         """Create a plant that provides the truth; see `Variant.make`."""
-        if self.in_mujoco:
-            return MujocoArm(self.truly(description, seed), carried)
-        return super().make(description, carried, seed)
+        return MujocoArm(self.truly(description, seed), carried)
 
 
 def _of(*names: str) -> tuple[Variant, ...]:
@@ -42,13 +34,12 @@ def _of(*names: str) -> tuple[Variant, ...]:
 
 ARMS: tuple[Variant, ...] = (
     *_of("calibrated", "coulomb", "stribeck", "hysteresis", "piecewise", "scattered", "base"),
-    ArmVariant("mujoco", "simulated in MuJoCo, without gear error", in_mujoco=True),
+    MujocoVariant("mujoco", "simulated in MuJoCo, without gear error"),
     *_of("blind"),
-    ArmVariant(
+    MujocoVariant(
         "blind_mujoco",
         "unlike the description in every mass, centre of mass, stiffness and gain, with sharper friction, in MuJoCo",
         VARIANTS["blind"].truly,
-        in_mujoco=True,
     ),
     *_of("torsion", "backlash", "combined"),
 )

@@ -7,7 +7,6 @@ from pathlib import Path
 
 from tvist_controller.api.line import OwnShaper
 from tvist_lab.study.foreign import FromFile
-from tvist_lab.study.menus import ROWS, Kind, MenuMethod, row, rows
 from tvist_lab.study.method import (
     ConstantMeanDelay,
     ConstantModes,
@@ -16,6 +15,7 @@ from tvist_lab.study.method import (
     PeriodOfJerk,
     StretchedDoubleS,
 )
+from tvist_lab.study.method_list import METHODS, Kind, ListedMethod, listed_method, methods_in
 from tvist_lab.study.recipes import Recipe, longest_mean_delay, robust
 from tvist_lab.study.study import StudyError
 from tvist_plant.description import RobotDescription
@@ -26,20 +26,23 @@ MOST_DECLARED = 1.1  # largest declared mass of the bench, relative to the ratin
 
 
 def build_method(
-    row: MenuMethod, recipe: Recipe, description: RobotDescription, masses: tuple[float, float] | None = None
+    row: ListedMethod,
+    recipe: Recipe,
+    description: RobotDescription,
+    masses: tuple[float, float] | None = None,
 ) -> Method:
     """Create a method of the catalogue."""
     return _MAKERS[row.kind](row, recipe, description, masses or (0.0, description.limits.payload))
 
 
 def _for_workspace(
-    row: MenuMethod, recipe: Recipe, description: RobotDescription, masses: tuple[float, float]
+    row: ListedMethod, recipe: Recipe, description: RobotDescription, masses: tuple[float, float]
 ) -> Method:
     f_d, zeta = robust(row.of, recipe, description, masses)
     return ConstantModes(recipe, row.name, row.label, row.of, f_d=f_d, zeta=zeta)
 
 
-def _held(row: MenuMethod, recipe: Recipe, description: RobotDescription, _: tuple[float, float]) -> Method:
+def _held(row: ListedMethod, recipe: Recipe, description: RobotDescription, _: tuple[float, float]) -> Method:
     # Use the longest mean delay over the workspace, for all declared masses.
     most = MOST_DECLARED * description.limits.payload
     delay = longest_mean_delay(recipe, description, (0.0, most), row.modes)
@@ -47,13 +50,13 @@ def _held(row: MenuMethod, recipe: Recipe, description: RobotDescription, _: tup
 
 
 def _as_long_as(
-    row: MenuMethod, recipe: Recipe, description: RobotDescription, masses: tuple[float, float]
+    row: ListedMethod, recipe: Recipe, description: RobotDescription, masses: tuple[float, float]
 ) -> Method:
-    like = next(one for one in ROWS if one.name == row.of)
+    like = next(one for one in METHODS if one.name == row.of)
     return StretchedDoubleS(row.name, row.label, build_method(like, recipe, description, masses))
 
 
-_MAKERS: dict[Kind, Callable[[MenuMethod, Recipe, RobotDescription, tuple[float, float]], Method]] = {
+_MAKERS: dict[Kind, Callable[[ListedMethod, Recipe, RobotDescription, tuple[float, float]], Method]] = {
     "filter": lambda row, recipe, *_: Named(
         replace(recipe, shaper=row.of or row.name, modes=max(row.modes, recipe.modes)), row.name, row.label
     ),
@@ -90,17 +93,16 @@ def some(
     found: dict[str, Method] = {}
     for one in wanted:
         if isinstance(one, OwnShaper):
-            own = replace(recipe, shaper=one.name, own=(one,))
-            method: Method = Named(own, one.name, one.place)
+            method: Method = Named(replace(recipe, shaper=one.name, own=(one,)), one.name, one.place)
         elif one.endswith(".py"):
             name = Path(one).stem
-            known = {each.name for each in rows()} | found.keys()
+            known = {each.name for each in methods_in()} | found.keys()
             method = FromFile(one, recipe, f"{name}.py" if name in known else name, one)
         else:
             try:
-                method = build_method(row(one), recipe, description, masses)
+                method = build_method(listed_method(one), recipe, description, masses)
             except UnknownShaperError as error:
-                every = [each.name for each in rows()]
+                every = [each.name for each in methods_in()]
                 like = "".join(f", did you mean {near!r}" for near in get_close_matches(error.name, every, 1))
                 raise StudyError(
                     f"there is no method {error.name!r}{like}: there are {', '.join(every)}"
@@ -116,5 +118,5 @@ def baselines(
     frequency_error: float = 0.0,
 ) -> tuple[Method, ...]:
     """Return the baselines for a shaper; fixed ones are designed for the workspace and these payloads [kg]."""
-    chosen = [one.name for one in rows("baselines") if calibration.modal is not None or one.modes == 1]
+    chosen = [one.name for one in methods_in("baselines") if calibration.modal is not None or one.modes == 1]
     return some(chosen, description, calibration, masses, frequency_error=frequency_error)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import polars as pl
 
@@ -20,7 +20,6 @@ class Column:
     """Where an entry holds the value, such as "delay_ms" or "less.p5"; a function of the entry; or an
     expression that computes it for a group of rows and is stored in the entry under its output name."""
     digits: int | None = None  # number of decimals; None for text
-    unit: str = ""  # suffix of the number
     meaning: str = ""  # meaning of the heading's first line
 
     def text(self, entry: Entry) -> str:
@@ -37,7 +36,7 @@ class Column:
             return " to ".join(replace(self, of="x").text({"x": one}) for one in value)
         if value is None:
             return "–"
-        return str(value) if self.digits is None else f"{value:.{self.digits}f}{self.unit}"
+        return str(value) if self.digits is None else f"{value:.{self.digits}f}"
 
 
 @dataclass(frozen=True)
@@ -66,48 +65,28 @@ def meanings(columns: Iterable[Column]) -> dict[str, str]:
 
 
 def across(
-    entries: Iterable[Entry],
-    line: str,
-    key: str,
-    cell: Column,
-    first: Sequence[Column] = (),
-    best: bool = False,
+    entries: Iterable[Entry], line: str, key: str, cell: Column, first: Sequence[Column] = ()
 ) -> ResultTable:
     """Return a table with a line for each value of `line`, and a column for each value of `key`."""
     lines: dict[Any, dict[str, Entry]] = {}
     for entry in entries:
         lines.setdefault(entry[line], {})[str(entry[key])] = entry
-    names = list(dict.fromkeys(name for one in lines.values() for name in one))
-    value = cell.of.meta.output_name() if isinstance(cell.of, pl.Expr) else str(cell.of)
 
     def of(name: str) -> Column:
-        found = [one[name][value] for one in lines.values() if best and one[name][value] is not None]
+        return Column(name, lambda one: cell.text(one["of"][name]) if name in one["of"] else None)
 
-        def text(one: Entry) -> str:
-            here = one["of"].get(name)
-            said = "–" if here is None else cell.text(here)
-            return f"**{said}**" if found and here is not None and here[value] == min(found) else said
-
-        return Column(name, text)
-
+    names = dict.fromkeys(name for one in lines.values() for name in one)
     shown = [{**next(iter(one.values())), "of": one} for one in lines.values()]
     return ResultTable(cell.title, shown, [Column(line, line), *first, *map(of, names)])
 
 
-def share(
-    name: str,
-    of: float,
-    called: str,
-    least: int = 0,
-    how: Literal["linear", "higher"] = "linear",
-    among: pl.Expr | None = None,
-) -> pl.Expr:
+def share(name: str, of: float, called: str, least: int = 0, among: pl.Expr | None = None) -> pl.Expr:
     """Return an expression for the percentile `of` (a share) of a measure, over the rows that have it.
 
-    `called` is its suffix; fewer than `least` rows give null; `how` interpolates; `among` selects rows.
+    `called` is its suffix; fewer than `least` rows give null; `among` selects rows.
     """
     column = pl.col(name) if among is None else pl.col(name).filter(among)
-    return pl.when(column.count() >= least).then(column.quantile(of, how)).alias(f"{name}_{called}")
+    return pl.when(column.count() >= least).then(column.quantile(of, "linear")).alias(f"{name}_{called}")
 
 
 def median(name: str) -> pl.Expr:

@@ -71,7 +71,7 @@ class FromFile(SampleMethod):
         except CandidateError:
             raise
         except Exception as error:
-            raise ShaperFaultError(f"raises {named(error)} when it is made") from error
+            raise ShaperFaultError(f"raises {named(error)} in its constructor") from error
         return UserShaper(made, info, estimator, np.array(move.start), np.array(description.limits.position))
 
 
@@ -109,16 +109,17 @@ class UserShaper:
             q_star = np.array(given, dtype=float)
         except (TypeError, ValueError):
             raise ShaperFaultError(
-                f"gives {type(given).__name__} {where}, where {q.size} numbers are wanted"
+                f"gives {type(given).__name__} {where}: must be {q.size} numbers"
             ) from None
         if q_star.shape != q.shape:
-            raise ShaperFaultError(f"returns shape {q_star.shape} {where} instead of {q.shape}")
+            raise ShaperFaultError(f"gives shape {q_star.shape} {where}: must be {q.shape}")
         if not np.isfinite(q_star).all():
-            raise ShaperFaultError(f"gives {q_star.tolist()} {where}: not every number is finite")
+            raise ShaperFaultError(f"gives {q_star.tolist()} {where}: must be finite")
         if (np.abs(q_star) > self._reach).any():
             joint = int(np.argmax(np.abs(q_star) - self._reach))
             raise ShaperFaultError(
-                f"gives {q_star[joint]:g} rad for joint {joint + 1} {where}: it turns ±{self._reach[joint]:.4g} rad"
+                f"gives {q_star[joint]:g} rad for joint {joint + 1} {where}: "
+                f"must be within ±{self._reach[joint]:.4g} rad"
             )
         self._q_star, self._tick = q_star, self._tick + 1
         return q_star.copy()
@@ -160,7 +161,7 @@ def _load(path: Path) -> Callable[[], Any]:
             classes[0]()
         except Exception as error:
             raise CandidateError(
-                f"shaper {path}: {classes[0].__name__}() raises {named(error)}; it is made without arguments"
+                f"shaper {path}: {classes[0].__name__}() raises {named(error)}: must need no arguments"
             ) from error
         return classes[0]
     if inspect.isfunction(getattr(module, "step", None)):

@@ -19,8 +19,7 @@ JUDGING = MappingProxyType(
         "shaperbench": 20261125,
         "robustness": 20261123,
     }
-)
-"""Seeds of published tables: nothing is tuned on them."""
+)  # seeds of published tables: nothing is tuned on them
 MOVES = 60  # number of moves for each cell of a published table, and the default
 MIN_MOVES = 20
 """Smallest number of moves for a verdict and for a 5th percentile, which is otherwise little more than the
@@ -48,13 +47,12 @@ def bootstrap(values: Floats, statistic: Callable[[Floats], Floats]) -> list[flo
     """
     if not values.size:
         return None
-    random = np.random.default_rng(0)
-    drawn = values[random.integers(0, len(values), (RESAMPLED, len(values)))]
+    drawn = values[np.random.default_rng(0).integers(0, len(values), (RESAMPLED, len(values)))]
     low, high = np.percentile(statistic(drawn), [2.5, 97.5])
     return [float(low), float(high)]
 
 
-def sure(name: str, percentile: float, called: str, least: int = 0) -> pl.Expr:
+def interval_of(name: str, percentile: float, called: str, least: int = 0) -> pl.Expr:
     """Return an expression for the 95 % bootstrap interval of a percentile, null for fewer than `least` rows."""
 
     def of(values: Floats) -> list[float] | None:

@@ -41,9 +41,9 @@ def samples_of(trajectory: Trajectory) -> Floats:
     return np.array(samples)
 
 
-def round_a_corner(start: Floats, corner: Floats, target: Floats, limits: MotionLimits = PAPER) -> Floats:
+def round_a_corner(start: Floats, corner: Floats, target: Floats) -> Floats:
     """Return a curved path of two double S, the second starting in the first's last quarter, shape (T, n) [rad]."""
-    first, second = point_to_point(start, corner, limits), point_to_point(corner, target, limits)
+    first, second = point_to_point(start, corner), point_to_point(corner, target)
     joined = (3 * len(first)) // 4
     length = max(joined + len(second), len(first))
     path = np.tile(first[-1], (length, 1))

@@ -71,8 +71,7 @@ class SampleMethod(Method):
 
     def shaped(self, task: Task) -> Shaped:
         """Shape the reference."""
-        found = shape(self.stepper(task), task.reference, watched=not task.as_served)
-        return self.driven(found, task)
+        return self.driven(shape(self.stepper(task), task.reference, watched=not task.as_served), task)
 
     def driven(self, found: Shaped, task: Task) -> Shaped:  # noqa: ARG002  most do without
         """Return a shaped reference with the feed-forward that it needs."""
@@ -123,8 +122,7 @@ class ConstantModes(SampleMethod):
     modes: int = 1  # number of lowest modes at the move's target, each with its own shaper
     f_d: float | None = None  # design frequency [Hz]; None for the estimate
     zeta: float | None = None  # design damping ratio [-]; None for the estimate
-    for_payload: bool = False
-    """Whether it is designed for the lowest mode over the workspace with the declared payload."""
+    for_payload: bool = False  # whether it is designed for the declared payload
 
     @property
     def told_target(self) -> bool:
@@ -179,8 +177,7 @@ class StretchedDoubleS(Planned):
 
     name: str
     label: str
-    like: Method | None = None
-    """Method whose duration it has; None for the motion that the task is compared with."""
+    like: Method | None = None  # method whose duration it has; None for the task's own
 
     def shaped(self, task: Task) -> Shaped:
         """Return a double S with less jerk."""

@@ -14,7 +14,7 @@ from msgspec import Meta, Struct
 from tvist_controller.api.line import CollisionModel, JointLine, MotionLimits, body, paper_payload
 from tvist_lab.recordings import Floats
 from tvist_lab.study.line import PAPER
-from tvist_lab.workspace import WORKSPACE, Region, ranges, workspace
+from tvist_lab.workspace import WORKSPACE, Region, workspace
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 from tvist_plant.user_file import read_bytes
@@ -102,28 +102,26 @@ def draw_moves(
     *,
     wrists: bool = False,
     stroke: tuple[float, float] = STROKE,
-    progress: Callable[[], None] = lambda: None,
 ) -> Drawn:
     """Draw random moves in the workspace, free of collision from start to target.
 
     `masses` are the smallest and largest carried mass [kg]; `stroke` the smallest and largest length, as a share of
-    the way to an independent configuration [-]; with `wrists`, the two outer wrist joints turn as well; `progress` is
-    called after each move. Raises MovesError if hardly any draw is free, or the arm has no wrist.
+    the way to an independent configuration [-]; with `wrists`, the two outer wrist joints turn as well. Raises
+    MovesError if hardly any draw is free, or the arm has no wrist.
     """
     if wrists and description.joints <= len(WORKSPACE.low):
         raise MovesError(
-            f"wrists: a {description.robot.model} has {description.joints} joints, and a wrist begins at the fifth"
+            f"wrists: a {description.robot.model} has {description.joints} joints, and wrists need at least 5"
         )
     random = np.random.default_rng(seed)
     collision = CollisionModel(description, body(paper_payload(description, masses[1])))
-    region = WITH_WRISTS if wrists else workspace(ranges(description))
+    region = WITH_WRISTS if wrists else workspace(description)
     moves: list[Move] = []
     draws = 0
     for draws, move in enumerate(_draws(random, region, description.joints, masses, stroke), 1):
         collision.declare(body(paper_payload(description, move.mass)))
         if is_free(collision, move):
             moves.append(move)
-            progress()
         if len(moves) == count:
             break
         if draws >= TRIES * (len(moves) + 1):
@@ -136,7 +134,7 @@ def stopped_stream(
 ) -> Floats:
     """Draw a stream that uses its limits fully and is stopped before its last target, shape (T, n) [rad]."""
     joints, random = len(start), np.random.default_rng([seed, 71])
-    region = workspace(ranges(description))
+    region = workspace(description)
     used = min(len(region.low), joints)
     generator = ruckig.Ruckig(joints, PERIOD)
     state, following = ruckig.InputParameter(joints), ruckig.OutputParameter(joints)
@@ -214,7 +212,7 @@ def _check(number: int, move: Move, description: RobotDescription) -> None:
     for end, q in (("start", move.start), ("target", move.target)):
         if len(q) != len(joints):
             model = description.robot.model
-            raise MovesError(f"move {number}: {end} has {len(q)} angles; {model} has {len(joints)} joints")
+            raise MovesError(f"move {number}: {end} has {len(q)} angles: must be {len(joints)} for a {model}")
         for joint, (angle, limit) in enumerate(zip(q, description.limits.position, strict=True)):
             if abs(angle) > limit:
                 raise MovesError(
@@ -222,7 +220,7 @@ def _check(number: int, move: Move, description: RobotDescription) -> None:
                     f"must be within ±{limit:.6g} rad"
                 )
     if max(abs(a - b) for a, b in zip(move.start, move.target, strict=True)) < MIN_TURN:
-        raise MovesError(f"move {number} is too short: no joint turns by {MIN_TURN:g} rad or more")
+        raise MovesError(f"move {number} is too short: a joint must turn by at least {MIN_TURN:g} rad")
 
 
 def _in_words(why: str) -> str:

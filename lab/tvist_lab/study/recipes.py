@@ -22,7 +22,7 @@ from tvist_lab.frequency_error import robust_over
 from tvist_lab.recordings import Floats
 from tvist_lab.study.line import samples_of
 from tvist_lab.study.moves import Move
-from tvist_lab.workspace import ranges, workspace
+from tvist_lab.workspace import workspace
 from tvist_plant.description import RobotDescription
 from tvist_protocol.calibration import Calibration
 from tvist_shaping.base import Filter
@@ -155,7 +155,7 @@ def _over_workspace(
     recipe: Recipe, description: RobotDescription, masses: Range, modes: int, count: int
 ) -> Iterator[tuple[Floats, Floats]]:
     """Yield damped frequencies [Hz] and damping ratios [-] of the lowest modes, with smallest and largest payload."""
-    region = workspace(ranges(description))
+    region = workspace(description)
     for mass in sorted(set(masses)):
         estimator = recipe.estimator(description, mass, modes)
         for q in region.spread(count, description.joints, seed=0):

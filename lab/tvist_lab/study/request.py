@@ -7,8 +7,8 @@ from typing import Any
 from tvist_controller.api.line import MotionLimits
 from tvist_lab.study.case import Case, arm_seed
 from tvist_lab.study.line import PAPER
-from tvist_lab.study.menus import Menu
 from tvist_lab.study.method import Method
+from tvist_lab.study.method_list import MethodSet
 from tvist_lab.study.moves import Move
 from tvist_lab.study.study import Study, StudyError
 from tvist_plant.description import RobotDescription
@@ -21,8 +21,7 @@ class StudyRequest:
 
     description: RobotDescription  # the arm, which is also the controller's model of it
     moves: Sequence[Move]
-    methods: Sequence[Method]
-    """The methods that the study always has, then the named shapers, then the baselines."""
+    methods: Sequence[Method]  # those of every study, named shapers, baselines
     named: int = 0  # number of methods before the baselines
     arms: Sequence[Variant] = ()  # the named plants
     seed: int = 0  # seed of gear errors and deviations
@@ -46,7 +45,9 @@ class StudyRequest:
     def cases(self, moves: Sequence[Move], arms: Sequence[Variant]) -> list[Case]:
         """Return a numbered case for each move, on some arms."""
         if not moves:
-            raise StudyError("the drives are too weak for all of these moves at these limits")
+            raise StudyError(
+                "no move is within the drives' torque at these limits: lower the limits or the payload"
+            )
         return [
             Case(
                 self.description, move, arm_seed(self.seed, place), tuple(arms), self.limits, self.payload_error,
@@ -63,7 +64,7 @@ class Preset:
     study: Callable[[StudyRequest], Study]
     always: tuple[str, ...] = ()
     shapers: tuple[str, ...] = ()  # default shapers
-    menu: Menu | None = None  # menu of the baselines; None if there are none
+    defaults: MethodSet | None = None  # methods that are compared with the shapers; None if there are none
     options: frozenset[str] = frozenset()  # options that it has besides those of all presets
     modal: bool = True  # whether each calibration needs a modal model
     least: int = 1

@@ -15,8 +15,7 @@ LONGEST = 3.0  # time after the reference's end within which a shaped reference 
 ENDED = 10  # number of ticks at the target after which the output has ended
 WATCHED = 0.5  # time for which the output is checked for a tail after it has ended [s]
 TAIL = 1e-6  # largest motion in that time, and largest distance from the target [rad]
-SLACK = 3
-"""Ticks by which a shaper may end later than declared, since interpolation uses samples on both sides."""
+SLACK = 3  # ticks of an end later than declared, due to interpolation
 WARM = 20  # number of first ticks whose processing time is ignored, since they may compile code
 
 
@@ -96,8 +95,7 @@ def shape(stepper: RunningShaper, reference: Floats, *, watched: bool) -> Shaped
         _check_tail(stepper, target)
         _check_word(q, stop, declared, own)
     said = declared[0]
-    delay = own if said is None else min(own, max(said, 0.0))
-    return Shaped(np.array(q), delay, cost, ended=quiet >= ENDED)
+    return Shaped(np.array(q), own if said is None else min(own, max(said, 0.0)), cost, ended=quiet >= ENDED)
 
 
 def _through(stepper: RunningShaper, reference: Floats, *, timed: bool) -> tuple[list[Floats], float | None]:
@@ -118,7 +116,7 @@ def _check_tail(stepper: RunningShaper, target: Floats) -> None:
         if away > TAIL:
             after = 1e3 * PERIOD * (late + ENDED)
             raise ShaperFaultError(
-                f"hides a tail: {after:.0f} ms after it seemed to have ended it is {away:.2g} rad from the target"
+                f"moves after its end: {after:.0f} ms later it is {away:.2g} rad from the target"
             )
 
 
@@ -130,7 +128,7 @@ def _check_word(q: list[Floats], stop: int, declared: list[float | None], own: f
         moved = float(np.abs(q[stop + late] - q[-1]).max())
         if moved > TAIL:
             raise ShaperFaultError(
-                f"hides a tail: it declares a delay of {1e3 * said:.0f} ms, and ends {1e3 * own:.0f} ms after the "
-                f"reference, {moved:.2g} rad further"
+                f"moves after its declared end: it declares a delay of {1e3 * said:.0f} ms, and ends "
+                f"{1e3 * own:.0f} ms after the reference, {moved:.2g} rad further"
             )
         return

@@ -30,7 +30,7 @@ class Store:
         self._parts = folder / PARTS
         manifest = folder / MANIFEST
         if not manifest.exists() and folder.is_dir() and any(folder.iterdir()):
-            raise StoreError(f"{folder} exists already and holds no study: give another --output")
+            raise StoreError(f"{folder} exists and is no folder of a study: give another --output")
         try:
             self._parts.mkdir(parents=True, exist_ok=True)
             self._lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
@@ -46,12 +46,11 @@ class Store:
         try:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
-            raise StoreError(f"another study is writing {self.folder}") from error
+            raise StoreError(f"{self.folder} is in use by another study: give another --output") from error
         if self._files():
             _check_same(self.folder, manifest, identity)
         else:
-            content = msgspec.json.format(msgspec.json.encode(identity), indent=1) + b"\n"
-            self._write(manifest, content)
+            self._write(manifest, msgspec.json.format(msgspec.json.encode(identity), indent=1) + b"\n")
         unfinished = f".*{UNFINISHED}"
         for forgotten in (*self.folder.glob(unfinished), *self._parts.glob(unfinished)):
             forgotten.unlink()
@@ -92,9 +91,7 @@ class Store:
         try:
             return pl.read_parquet(file.read_bytes(), schema=self._schema)
         except (pl.exceptions.PolarsError, OSError) as error:
-            raise StoreError(
-                f"{file} cannot be read as rows of a study: remove it to run them again"
-            ) from error
+            raise StoreError(f"{file} has no rows of a study: remove it to run them again") from error
 
     def done(self) -> set[int]:
         """Return the cases that are done: all their rows exist and none failed."""
@@ -120,7 +117,7 @@ def _check_same(folder: Path, manifest: Path, identity: dict[str, Any]) -> None:
     try:
         held = msgspec.json.decode(manifest.read_bytes(), type=dict[str, Any])
     except (OSError, msgspec.DecodeError) as error:
-        raise StoreError(f"{manifest} cannot be read as what a study is of: give another --output") from error
+        raise StoreError(f"{manifest} does not describe a study: give another --output") from error
     wanted = msgspec.json.decode(msgspec.json.encode(identity))
     changed = [name for name in dict.fromkeys((*wanted, *held)) if wanted.get(name) != held.get(name)]
     if changed:

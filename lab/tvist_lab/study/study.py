@@ -10,13 +10,13 @@ from typing import Any
 import polars as pl
 from matplotlib.figure import Figure
 
+from tvist_lab.phrases import QUANTILES_FROM
 from tvist_lab.study.case import Case
-from tvist_lab.study.columns import Column, ResultTable, highest, lowest, p5, share
+from tvist_lab.study.columns import Column, ResultTable, highest, lowest, median, p5, share
 from tvist_lab.study.foreign import run_file
 from tvist_lab.study.measures import MEASURES, OF_PEAKS
 from tvist_lab.study.method import Method
 from tvist_lab.study.work import FAILED, MEASURED, TOO_WEAK, Job, Row
-from tvist_lab.words import QUANTILES_FROM
 
 KINDS: Mapping[type, Any] = {
     bool: pl.Boolean, int: pl.Int64, float: pl.Float64, str: pl.String, list: pl.List(pl.Float64),
@@ -24,9 +24,11 @@ KINDS: Mapping[type, Any] = {
 """Column types by the type of an axis's values."""
 COUNTS = {"rows": pl.len()} | {
     status.replace(" ", "_"): (pl.col("status") == status).sum() for status in (MEASURED, TOO_WEAK, FAILED)
-}
-"""Counts in each group of rows."""
+}  # counts in each group of rows
 DIGITS = 3
+QUANTILES = {"median": median, "p95": lambda name: share(name, 0.95, "p95")}
+EXTREMES = {"least": lowest, "most": highest}
+"""Columns of a measure by their names, if there are enough rows for quantiles, and if not."""
 
 Figures = Mapping[str, tuple[Figure, str]]  # figures and captions, by file name without suffix
 
@@ -35,21 +37,12 @@ class StudyError(ValueError):
     """A study cannot be made; the message tells why."""
 
 
-def of_measures(*names: str) -> tuple[Column, ...]:
-    """Return columns of the medians and 95th percentiles of measures."""
-    return tuple(
-        Column(f"{name}\n{called}", share(name, of, called), DIGITS, meaning=_meaning(name))
-        for name in names
-        for called, of in (("median", 0.5), ("p95", 0.95))
-    )
-
-
-def ends_of(*names: str) -> tuple[Column, ...]:
-    """Return columns of the smallest and the largest values of measures."""
+def columns_of(names: Iterable[str], *, few: bool) -> tuple[Column, ...]:
+    """Return columns of the medians and 95th percentiles of measures, or of their extremes for few rows."""
     return tuple(
         Column(f"{name}\n{called}", of(name), DIGITS, meaning=_meaning(name))
         for name in names
-        for called, of in (("least", lowest), ("most", highest))
+        for called, of in (EXTREMES if few else QUANTILES).items()
     )
 
 
@@ -92,10 +85,8 @@ class Study:
     finish: Callable[[Result], None] = lambda _: None  # adds to a result what no column can compute
     tables: Callable[[Result], Sequence[ResultTable]] | None = None
     """Returns the tables; None for one with the summary."""
-    draw: Callable[[Result], Figures] | None = None
-    """Draws the figures; None for the measures over the first axis."""
-    as_served: bool = True
-    """Whether moves are planned for the shaper as by a robot, instead of using the same reference."""
+    draw: Callable[[Result], Figures] | None = None  # None: measures over the first axis
+    as_served: bool = True  # whether moves are planned for the shaper as by a robot
     notes: str = ""
     facts: Mapping[str, Any] = field(default_factory=dict)  # properties of the cases, for --json
     identity: Mapping[str, Any] = field(default_factory=dict)
@@ -105,7 +96,7 @@ class Study:
     @property
     def shown(self) -> tuple[Column, ...]:
         """Columns of its table, without those that distinguish the lines."""
-        return self.columns or of_measures(*self.show)
+        return self.columns or columns_of(self.show, few=False)
 
     def jobs(self, places: Iterable[int] | None = None) -> Iterator[Job]:
         """Create the jobs of the cases at these places, by default of all."""
@@ -135,17 +126,17 @@ class Study:
     def check(self) -> None:
         """Raise StudyError if the study cannot be made."""
         if not self.cases or not (self.methods or self.cases[0].methods):
-            raise StudyError("it needs a case and a method at least")
+            raise StudyError("cases or methods is empty: must have at least one of each")
         for place, case in enumerate(self.cases):
             self._check_case(f"cases[{place}]", case)
         for what, names in (("show", self.show), ("measures", self.measures), ("by", self.by)):
             if isinstance(names, str):
                 raise StudyError(f"{what} is {names!r}: must be a tuple of names, ({names!r},)")
         if not self.show:
-            raise StudyError("show is empty: must name a measure at least")
+            raise StudyError("show is empty: must name at least one measure")
         taken = {"case", "shaper", "arm", "status", "error", *self.measured}.intersection(self.cases[0].axes)
         if taken:
-            raise StudyError(f"axis {min(taken)!r} has the name of another column: give it another one")
+            raise StudyError(f"axis {min(taken)!r} is the name of another column: give it another name")
         axes = (*self.cases[0].axes, "arm", "shaper")
         for name in self.by:
             if name not in axes:
@@ -154,9 +145,8 @@ class Study:
         self._check_columns()
 
     def _check_case(self, place: str, case: Case) -> None:
-        first = self.cases[0]
-        if set(case.axes) != set(first.axes):
-            raise StudyError(f"{place} has the axes {sorted(case.axes)}: all need the same")
+        if set(case.axes) != set(self.cases[0].axes):
+            raise StudyError(f"{place} has the axes {sorted(case.axes)}: must be the same for all")
         for limit, value in vars(case.limits).items():
             if not (isinstance(value, int | float) and value > 0.0):
                 raise StudyError(f"{place} has the {limit} limit {value!r}: must be a positive number")
@@ -166,7 +156,9 @@ class Study:
         there = self.prepare(self.frame([])).columns
         for name in self._needed():
             if name not in there:
-                raise StudyError(f"a column needs {name!r}, no measure: there are {', '.join(MEASURES)}")
+                raise StudyError(
+                    f"a column uses {name!r}, which is no measure: there are {', '.join(MEASURES)}"
+                )
         entry = (*self.keys, *COUNTS, *self._computed())
         for one in self.shown if self.finish is Study.finish else ():
             if isinstance(one.of, str) and one.of not in entry:
@@ -188,10 +180,11 @@ class Study:
 
     def _computed(self) -> dict[str, pl.Expr]:
         every = dict.fromkeys((*self.show, *(() if self.columns else self.measures)))
-        drawn = (*of_measures(*every), *ends_of(*every)) if self.draw is None else ()
-        columns = (one.of for one in (*self.shown, *self.few, *drawn))
-        worst = map(p5, every) if self.draw is None else ()
-        computed = (*(one for one in columns if isinstance(one, pl.Expr)), *worst, *self.more)
+        columns, worst = [*self.shown, *self.few], list[pl.Expr]()
+        if self.draw is None:
+            columns += [*columns_of(every, few=False), *columns_of(every, few=True)]
+            worst += map(p5, every)
+        computed = (*(one.of for one in columns if isinstance(one.of, pl.Expr)), *worst, *self.more)
         return {one.meta.output_name(): one for one in computed}
 
     def _needed(self) -> list[str]:
@@ -199,10 +192,9 @@ class Study:
 
     def result(self, rows: pl.DataFrame, about: Mapping[str, Any]) -> Result:
         """Return the result of all rows."""
-        methods = {one.name: one for one in (*self.cases[0].methods, *self.methods)}
         values = {
             "title": self.title, **self.facts, **about,
-            "methods": described(methods.values()),
+            "methods": described({one.name: one for one in (*self.cases[0].methods, *self.methods)}.values()),
             "arms": {arm.name: arm.label for arm in self.cases[0].arms},
             "summary": self.summary(rows),
             **{name: self.summary(rows, *axes) for name, axes in self.splits.items()},
@@ -218,11 +210,11 @@ class Study:
             return self.tables(result)
         return [self.table_of(result.values["summary"])]
 
-    def table_of(self, entries: Sequence[dict[str, Any]], title: str = "") -> ResultTable:
+    def table_of(self, entries: Sequence[dict[str, Any]]) -> ResultTable:
         """Return the table of a summary; with few rows, with extremes instead of medians."""
         many = all(entry.get("counted", entry["rows"]) >= QUANTILES_FROM for entry in entries)
-        columns = self.shown if many else self.few or (self.columns or ends_of(*self.show))
-        return ResultTable(title, entries, [*(Column(name, name) for name in self.keys), *columns])
+        columns = self.shown if many else self.few or self.columns or columns_of(self.show, few=True)
+        return ResultTable("", entries, [*(Column(name, name) for name in self.keys), *columns])
 
 
 def described(methods: Iterable[Method]) -> list[dict[str, Any]]:
@@ -250,8 +242,7 @@ def _check_alone(names: Sequence[str], what: str) -> None:
 def read_study(path: Path) -> Study:
     """Run a Python file, and return its `STUDY`."""
     content = path.read_bytes()
-    module = run_file(path, "study", StudyError)
-    found = getattr(module, "STUDY", None)
+    found = getattr(run_file(path, "study", StudyError), "STUDY", None)
     if not isinstance(found, Study):
         raise StudyError(f"study {path}: contains no STUDY = Study(...)")
     try:

@@ -138,8 +138,7 @@ def _rows(bench: Bench, method: Method) -> list[Row]:
 
 def record(job: Job) -> tuple[Recording, Recording]:
     """Record a case on its first arm, unshaped and by the job's first method."""
-    bench = Bench(job)
-    ((_, motion), *_) = bench.make(job.methods[0])
+    ((_, motion), *_) = Bench(job).make(job.methods[0])
     return motion.unshaped.recording, motion.recording
 
 

@@ -99,7 +99,7 @@ def _motions(
         motion_cells,
         motions,
     )
-    from tvist_lab.words import counted
+    from tvist_lab.phrases import counted
 
     found, results = motions(recording), []
     with progress(len(found), "motions") as bar:

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
+from tvist_lab.phrases import counted
 from tvist_lab.recordings.checks import LogError, content
 from tvist_lab.recordings.description import beside
 from tvist_lab.recordings.recording import Floats
 from tvist_lab.recordings.table import STRANGE, TEXT, LogTable, reader
-from tvist_lab.words import counted
 
 SEPARATORS = (";", "\t", ",", " ")  # Separators of cells, in the order in which they are sought in the header
 EMPTY = ("", "nan", "NaN", "NAN", "None", "null", "NULL", "NA", "-")  # cells without a number

@@ -39,8 +39,7 @@ def _packets(path: Path, data: bytes) -> tuple[list[int], int, int]:
     head = struct.pack(">i", size)
     starts, at = [], first
     while 0 <= at <= len(data) - size:
-        following = data[at + size : at + size + 4]
-        if data.startswith(head, at) and head.startswith(following):
+        if data.startswith(head, at) and head.startswith(data[at + size : at + size + 4]):
             starts.append(at)
             at += size
         else:  # bytes are missing: this packet is torn

@@ -84,7 +84,7 @@ def _check_size(path: Path, numbers: int) -> None:
     most = (MIN_CONTENT + DENSEST * path.stat().st_size) // 8
     if numbers > most:
         raise LogError(
-            f"{path} cannot be read: it claims {numbers:g} numbers, a file of its size holds at most {most}"
+            f"{path} cannot be read: it declares {numbers:g} numbers: must be at most {most} for its size"
         )
 
 
@@ -103,8 +103,7 @@ def _numbers(path: Path) -> pl.DataFrame:
         _check_size(path, rows * width)
         entries = [column.list.get(at, null_on_oob=True).alias(f"{column.name}_{at}") for at in range(width)]
         table = table.drop(column.name).hstack(entries)
-    numeric = pl.selectors.numeric() | pl.selectors.boolean()
-    return table.select(numeric.cast(pl.Float64).fill_null(np.nan))
+    return table.select((pl.selectors.numeric() | pl.selectors.boolean()).cast(pl.Float64).fill_null(np.nan))
 
 
 def _main(path: Path) -> int:

@@ -54,8 +54,7 @@ def measure(
     wanted = study(asked)
     weak = len(drawn) - len(wanted.cases)
     progress(weak)
-    ran = run(wanted, progress=lambda _: nullcontext(progress))
-    summary = wanted.summary(ran.rows)[0]
+    summary = wanted.summary(run(wanted, progress=lambda _: nullcontext(progress)).rows)[0]
     return {
         "stiffness": stiffness,
         "calibration": "identified" if calibration is None else known.name,
@@ -72,10 +71,9 @@ def measure(
 async def _identified(arm: RobotDescription, seed: int) -> Calibration:
     """Identify an arm in this process, like `tvist identify` by default."""
     carried = tuple(paper_payload(arm, mass) for mass in (0.0, arm.payload.mass))
-    start = next(iter(arm.poses.values()))
     setup = Setup(
         description=arm,
-        q=start,
+        q=next(iter(arm.poses.values())),
         payload=paper_payload(arm),
         calibration=None,
         seed=seed,
@@ -102,6 +100,5 @@ def sag_error(arm: RobotDescription, seed: int) -> float:
         expected = -pin.computeGeneralizedGravity(rigid, data, q) / stiffness
         largest = float(np.abs(expected).max())
         if largest > TWIST:
-            twist = plant.truth().gear_deflection
-            worst = max(worst, float(np.abs(twist - expected).max()) / largest)
+            worst = max(worst, float(np.abs(plant.truth().gear_deflection - expected).max()) / largest)
     return 100.0 * worst

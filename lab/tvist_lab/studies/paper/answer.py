@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from tvist_lab.change import MotionChange
 from tvist_lab.metrics.common_clock import AFTER_STOP, STILL
+from tvist_lab.metrics.comparison import MotionChange
 
 POSES = {"Q1": "stretched out", "Q2": "stretched out to the side", "Q3": "folded"}
 

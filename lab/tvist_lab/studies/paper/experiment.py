@@ -18,8 +18,7 @@ from tvist_lab.studies.paper.published import MOTIONS, pose
 from tvist_protocol.info import Info
 
 BEFORE = 0.1  # time recorded before a motion [s]
-AFTER = 1.9
-"""Time recorded after the motion's end [s]: the drives' slow loops need it to settle within 0.03 mm."""
+AFTER = 1.9  # recorded time after the end, in which the drives' slow loops settle [s]
 
 ACCELERATION, JERK = 2.0, 100.0  # the paper's limits [rad/s², rad/s³]
 Progress = Callable[[str], None]
@@ -34,8 +33,7 @@ class PaperMethod:
     shaper: str = "none"
     modes: tuple[float, float] | None = None
     """Constant design frequency [Hz] and damping ratio [-]; None for the polynomials of the robot's calibration."""
-    frozen: bool = False
-    """Whether it uses the modes of the end pose throughout, which requires the target in advance."""
+    frozen: bool = False  # whether it uses the modes of the end pose throughout
     jerk: float = JERK  # jerk limit of the motion [rad/s³]
 
     async def prepare(self, robot: Robot, arm: Arm, end: tuple[float, ...]) -> None:
@@ -76,8 +74,7 @@ class JudgedRun:
     """One run of one motion."""
 
     result: MotionResult
-    peak: float | None
-    """Largest true |α| later than 10 ms after the reference stops [m/s²]; None without the truth."""
+    peak: float | None  # largest true |α| later than 10 ms after the stop [m/s²]
 
 
 @dataclass
@@ -87,8 +84,7 @@ class Experiment:
     info: Info
     seed: int
     runs: int
-    table_1: dict[str, dict[str, float]]
-    """Lowest mode at each pose: estimated, and true if the robot publishes the truth."""
+    table_1: dict[str, dict[str, float]]  # lowest mode at each pose, and the true one if known
     judged: dict[tuple[str, str], list[JudgedRun]] = field(default_factory=dict)
     """Results of all runs, by motion and method."""
     labels: dict[str, str] = field(default_factory=dict)
@@ -111,8 +107,7 @@ class Experiment:
 def judge(recording: Recording) -> JudgedRun:
     """Measure the one motion of a recording."""
     motion = motions(recording)[0]
-    has_truth = "truth_tool_acceleration" in recording
-    peak = peak_after_stop(recording, motion) if has_truth else None
+    peak = peak_after_stop(recording, motion) if ("truth_tool_acceleration" in recording) else None
     return JudgedRun(measure(recording, motion), peak)
 
 

@@ -13,8 +13,7 @@ from tvist_lab.studies.paper.experiment import Experiment
 from tvist_lab.studies.paper.published import MOTIONS
 
 NUMBERS = {"Q1-Q2": 12, "Q1-Q3": 13, "Q3-Q1": 14}
-DEFINED_ON = "Q1-Q2"
-"""Motion for figure 15 with delay, stabilisation, cycle and overshoot, and for the spectrogram."""
+DEFINED_ON = "Q1-Q2"  # motion of figure 15 and of the spectrogram
 
 
 def draw(done: Experiment, *, all_figures: bool) -> dict[str, Figure]:

@@ -33,13 +33,11 @@ OF_MOTION = (
     ("cycle", _BOTH, "cycle_ms", "{:.0f} ms", 0.03, 0.0),
     ("stabilisation", _BOTH, "stabilisation_ms", "{:.0f} ms", 0.25, 40.0),
     ("overshoot", _BOTH, "overshoot_m", "{:.1e} m", 0.35, 1.5e-5),
-)
-"""Figures of each motion: name, place in Table 2, format, and relative and absolute tolerance."""
+)  # figures of each motion: name, place in Table 2, format, and relative and absolute tolerance
 ADJUSTED = {
     "UR5e": {"Table 1": FITTED, "RV unshaped": TUNED, "RV reduced by": TUNED},
     "UR5e_stiction": {"Table 1": FITTED} | dict.fromkeys([name for name, *_ in OF_MOTION[1:]], TUNED),
-}
-"""Figures to which each arm's parameters were fitted or tuned, by model; all others are predicted."""
+}  # figures to which each arm's parameters were fitted or tuned, by model; all others are predicted
 
 FIGURES = ("delay ms", "stabilisation ms", "cycle ms", "overshoot m", "RV m/s²")
 IMPACTS = ("stabilisation", "cycle", "overshoot", "residual_vibration")
@@ -179,10 +177,9 @@ def methods(result: dict[str, Any], motion: str, first: str) -> list[tuple[str, 
 def beside(arms: Sequence[dict[str, Any]]) -> list[tuple[str, ...]]:
     """Return heading and rows of the table of origins, with the paper's figures and those of each arm."""
     heading = ("figure", "paper", *(title for one in arms for title in (one["robot"], "origin")))
-    rows = zip(*(one["origins"] for one in arms), strict=True)
     return [heading, *(
         (same[0]["figure"], same[0]["paper"], *(row[key] for row in same for key in ("here", "origin")))
-        for same in rows
+        for same in zip(*(one["origins"] for one in arms), strict=True)
     )]  # fmt: skip
 
 
