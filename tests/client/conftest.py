@@ -63,14 +63,10 @@ class Host(LoopbackHost):
     def info(self):
         return encode(msgspec.structs.replace(decode(Info, super().info()), **self.told))
 
-    def put(self, topic, message):
-        """Tell clients a message of the test's own."""
-        self._put(topic, lambda: encode(message))
-
     def tick(self):
         self._host.tick()
         if self.promised is not None and self.controller.tick_number % 20 == 0:
-            self.put("telemetry", self.telemetry())
+            self.publish(self.telemetry())
 
     def telemetry(self):
         tick = self.controller.tick_number

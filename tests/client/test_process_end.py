@@ -63,7 +63,7 @@ def test_an_interrupted_program_releases_control_and_ends(realtime, endpoint):
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     with subprocess.Popen([sys.executable, "-c", INTERRUPTED, endpoint], **pipes) as program:
         assert program.stdout.readline() == "listens\n"
-        realtime.post(lambda: realtime.robot.put("event", Event(tick=1, kind="warning", why="it waits")))
+        realtime.post(lambda: realtime.robot.publish(Event(tick=1, kind="warning", why="it waits")))
         assert program.stdout.readline() == "it waits\n"
         program.send_signal(signal.SIGINT)
         out, err = program.communicate(timeout=100.0)

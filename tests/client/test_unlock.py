@@ -33,7 +33,7 @@ async def test_another_protective_stop_after_unlocking_raises_an_error(realtime,
 
     def unlocks():
         for event in told:
-            host.put("event", event)
+            host.publish(event)
         return Done()
 
     host.answers["unlock_protective_stop"] = unlocks

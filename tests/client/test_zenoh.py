@@ -80,8 +80,8 @@ async def test_a_liveliness_token_with_an_invalid_name_is_ignored(endpoint):
 
 async def test_an_event_that_precedes_the_answer_is_not_lost(realtime, robot):
     def begins():
-        realtime.robot.put("event", Event(tick=7, kind="motion_started", id=4))
-        realtime.robot.put("event", Event(tick=9, kind="motion_done", id=4))
+        realtime.robot.publish(Event(tick=7, kind="motion_started", id=4))
+        realtime.robot.publish(Event(tick=9, kind="motion_done", id=4))
         return Accepted(id=4)
 
     realtime.robot.answers["move_j"] = begins
@@ -210,7 +210,7 @@ async def test_messages_on_wildcard_keys_are_ignored(realtime, robot, endpoint):
     for key in ("tvist/*/event", "tvist/**"):
         transport._session.put(key, encode(Event(tick=0, kind="protective_stop")))
     await transport.info()  # the puts have passed
-    realtime.post(lambda: realtime.robot.put("event", Event(tick=1, kind="warning")))
+    realtime.post(lambda: realtime.robot.publish(Event(tick=1, kind="warning")))
     assert (await anext(events)).kind == "warning"
     await transport.close()
 

@@ -124,7 +124,7 @@ class TestInLockstep:
             ("--check --lockstep moves.script", ["--check runs nothing"]),
             ("moves.script wrong.script", ["--lockstep", "--check", "wrong.script"]),
             ("moves.script moves.script --lockstep", ["moves.script is given twice"]),
-            ("moves.script waits.script --lockstep --record x", ["record is x", "these are 2"]),
+            ("moves.script waits.script --lockstep --record x", ["record is x", "there are 2"]),
             ("moves.script --max-shake 0", ["max-shake is 0 m/s²", "more than 0"]),
             ("moves.script --max-joint-speed nan", ["max-joint-speed is nan rad/s", "finite"]),
             ("moves.script --junit no/x.xml", ["junit is no/x.xml", "no folder no"]),
