@@ -4,7 +4,6 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-import msgspec
 import numpy as np
 import pinocchio as pin
 
@@ -54,7 +53,7 @@ class FlexibleArm(SimulatedArm):
     ) -> None:
         self.description = description
         self.period = period
-        more = msgspec.to_builtins(description.imperfections).keys() - STICTION
+        more = description.imperfections.given().keys() - STICTION
         usual = SUBSTEPS_IF_IMPERFECT if more else SUBSTEPS_OF_A_PERIOD
         self._substeps = usual if substeps is None else substeps
         self._imperfections = Imperfections.of(description, imperfections)

@@ -2,10 +2,10 @@
 
 import math
 from collections.abc import Collection
-from typing import Annotated
+from typing import Annotated, Any
 
 import msgspec
-from msgspec import Meta, Struct
+from msgspec import Meta, Struct, structs
 
 from tvist_plant.user_file import UserFileError
 
@@ -181,9 +181,13 @@ class Imperfections(_Table, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     @classmethod
     def of(cls, description: "RobotDescription", more: "Imperfections | None" = None) -> "Imperfections":
         """Return the robot file's imperfections, overridden by values of `more` other than the defaults."""
-        parts = (description.imperfections, cls() if more is None else more)
-        own, given = (msgspec.to_builtins(part) for part in parts)
-        return msgspec.convert(own | given, cls)
+        return structs.replace(description.imperfections, **({} if more is None else more.given()))
+
+    def given(self) -> dict[str, Any]:
+        """Return the values other than the defaults."""
+        defaults = type(self)()
+        values = {name: getattr(self, name) for name in self.__struct_fields__}
+        return {name: value for name, value in values.items() if value != getattr(defaults, name)}
 
 
 class Body(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -232,9 +236,8 @@ class RobotDescription(_Table, frozen=True, forbid_unknown_fields=True, kw_only=
     drives: Drives
     link_flexibility: LinkFlexibility = LinkFlexibility()
     sensors: Sensors = Sensors()
-    imperfections: Imperfections = (
-        Imperfections()
-    )  # of the simulated arm; a controller knows only the stiction
+    imperfections: Imperfections = Imperfections()
+    """Those of the simulated arm; a controller knows only the stiction."""
     collision: Collision = Collision()
     meshes: tuple[Mesh, ...] = ()
     poses: dict[str, tuple[Number, ...]] = {}

@@ -11,7 +11,7 @@ from math import radians
 from typing import Any
 
 import numpy as np
-from msgspec import convert, structs, to_builtins
+from msgspec import convert, structs
 
 from tvist_plant.flexible_arm import SUBSTEPS_IF_IMPERFECT, FlexibleArm
 from tvist_plant.imperfections import Imperfections, YieldingBase
@@ -135,7 +135,7 @@ def rubbed(
     factors: Mapping[str, float | tuple[float, ...]], description: RobotDescription, _seed: int = 0
 ) -> RobotDescription:
     """Return an arm with stiction, its friction multiplied by factors such as `HEAVIER`."""
-    own = {"coulomb_friction": description.drives.coulomb_friction, **to_builtins(description.imperfections)}
+    own = {"coulomb_friction": description.drives.coulomb_friction, **description.imperfections.given()}
     new = {name: (np.array(value) * factors.get(name, 1.0)).tolist() for name, value in own.items()}
     drives = structs.replace(description.drives, coulomb_friction=tuple(new.pop("coulomb_friction")))
     return structs.replace(description, drives=drives, imperfections=convert(new, Imperfections))
