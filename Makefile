@@ -72,6 +72,7 @@ nightly: setup elsewhere $(DOCS_READY)
 	$(BESIDE) -m nightly --record-nightly --durations 20
 
 # Random cases of all that is promised of stops, streams, changes and sequences of commands, over five arms in turn.
+search: CASES = 100
 search: setup
 	$(BESIDE) -m search $(SEARCH)
 

@@ -1,6 +1,7 @@
 """Builds messages from users' arguments; the types of the messages' fields say what is allowed."""
 
 from collections.abc import Iterable, Mapping
+from decimal import Decimal
 from functools import cache, reduce
 from operator import or_
 from types import GenericAlias, NoneType, UnionType
@@ -13,7 +14,6 @@ from msgspec.structs import FieldInfo, fields
 from tvist_client.errors import ArgumentError
 from tvist_protocol.content import checked
 from tvist_protocol.errors import ProtocolError, quoted
-from tvist_protocol.explain import FAULTS
 from tvist_protocol.forces import Choices
 from tvist_protocol.values import DampingRatios, Frequencies, Payload
 
@@ -64,11 +64,11 @@ def make_payload(mass: float, com: Iterable[float], inertia: Iterable[float]) ->
 def _plain(value: Any, name: str, hint: Any) -> Any:
     """Convert a value to plain numbers, strings and lists, with a list for one mode and True for a switch that is 1."""
     try:
-        plain = msgspec.to_builtins(value, enc_hook=_builtin)
-    except FAULTS:
+        plain = msgspec.to_builtins(value, builtin_types=(bytes, bytearray, Decimal), enc_hook=_builtin)
+    except (TypeError, RecursionError, OverflowError) as error:
         raise ArgumentError(
             name, f"{name} is {quoted(value)}: must consist of numbers, lists and strings"
-        ) from None
+        ) from error
     members = get_args(hint) if get_origin(hint) in _UNIONS else (hint,)
     if {Frequencies, DampingRatios} & set(members) and isinstance(plain, int | float):
         return [plain]
@@ -78,8 +78,11 @@ def _plain(value: Any, name: str, hint: Any) -> Any:
 
 
 def _builtin(value: Any) -> Any:
-    """Convert what is not Python's own: arrays and numbers of numpy, and iterators."""
-    return value.tolist() if hasattr(value, "tolist") else list(value)
+    """Convert what is not Python's own: arrays and numbers of numpy, other numbers, and iterators."""
+    plain = value.tolist() if hasattr(value, "tolist") else value
+    if type(plain) is not type(value):
+        return plain
+    return float(value) if hasattr(value, "__float__") else list(value)
 
 
 def _switch(value: Any) -> Any:

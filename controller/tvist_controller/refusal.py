@@ -29,7 +29,7 @@ class RefusalError(Exception):
         self.reply = Refused(code=code, where=where, why=why, limit=limit)
 
 
-def out_of_range(
+def invalid(
     field: str, value: object, must: str, limit: float | None = None, code: Code = "out_of_range"
 ) -> RefusalError:
     """Return the refusal of a field's value, which must be something else."""
@@ -79,9 +79,7 @@ def _check_each(values: Sequence[float], limits: Sequence[float], code: Code, wh
         raise RefusalError("out_of_range", where, why, count)
     for number, (value, limit) in enumerate(zip(values, limits, strict=True)):
         if not abs(value) <= limit:
-            raise out_of_range(
-                f"{where}[{number}]", f"{value:g} {unit}", f"within ±{limit:g} {unit}", limit, code
-            )
+            raise invalid(f"{where}[{number}]", f"{value:g} {unit}", f"within ±{limit:g} {unit}", limit, code)
 
 
 def check_motion(
@@ -103,14 +101,14 @@ def check_acceleration(acceleration: float, description: RobotDescription, prefi
 def _check_limit(code: Code, name: str, value: float, highest: float, unit: str, prefix: str) -> None:
     if value > highest:
         must = f"at most {highest:g} {unit}, the arm's limit"
-        raise out_of_range(f"{prefix}{name}", f"{value:g} {unit}", must, highest, code)
+        raise invalid(f"{prefix}{name}", f"{value:g} {unit}", must, highest, code)
     _check_least(name, value, unit, prefix)
 
 
 def _check_least(name: str, value: float, unit: str, prefix: str) -> None:
     if value < (lowest := SLOWEST[name]):
         must = f"at least {lowest:g} {unit}"
-        raise out_of_range(f"{prefix}{name}", f"{value:g} {unit}", must, lowest)
+        raise invalid(f"{prefix}{name}", f"{value:g} {unit}", must, lowest)
 
 
 def check_body(payload: Payload, where: str = "", rated: float = math.inf) -> None:
@@ -118,9 +116,9 @@ def check_body(payload: Payload, where: str = "", rated: float = math.inf) -> No
     prefix = f"{where}." if where else ""
     if payload.mass > rated:
         must = f"at most {rated:g} kg, the arm's rating"
-        raise out_of_range(f"{prefix}mass", f"{payload.mass:g} kg", must, rated)
+        raise invalid(f"{prefix}mass", f"{payload.mass:g} kg", must, rated)
     if not is_real_body(payload.inertia):
-        raise out_of_range(f"{prefix}inertia", list(payload.inertia), "the moments of inertia of a real body")
+        raise invalid(f"{prefix}inertia", list(payload.inertia), "the moments of inertia of a real body")
 
 
 def check_pace(velocity: float, acceleration: float, jerk: float, where: str = "") -> None:

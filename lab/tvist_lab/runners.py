@@ -70,7 +70,7 @@ def outcomes(
             yield next_outcome()
     except BrokenExecutor:
         raise ChildProcessError(
-            "a worker process ended during a task: free memory, or use fewer workers"
+            "a worker process ended during a task; perhaps memory ran out: give fewer --processes"
         ) from None
     except CancelledError:
         raise ConnectionError("the executor has dropped its tasks; perhaps its scheduler has gone") from None

@@ -132,7 +132,10 @@ def _tag(fault: _Fault) -> ProtocolError:
 
 
 def _kind(fault: _Fault, wanted: str, got: str) -> ProtocolError:
-    why = f"{fault.whole} must be {_kinds(wanted)}, not {_kinds(got)}"
+    if isinstance(fault.value, str | int | float):
+        why = f"{fault.whole} is {quoted(fault.value)}: must be {_kinds(wanted)}"
+    else:
+        why = f"{fault.whole} must be {_kinds(wanted)}, not {_kinds(got)}"
     return ProtocolError("malformed", fault.where, why)
 
 

@@ -3,7 +3,7 @@
 import re
 import types
 from collections.abc import Iterator
-from typing import Annotated, Any, Final, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin, get_type_hints
 
 import msgspec
 
@@ -103,5 +103,6 @@ def _culprit(content: Any, kind: object) -> str:
 
 
 def _literals(kind: object) -> Iterator[str]:
-    for part in get_args(kind):
-        yield from [repr(part)] if isinstance(part, str) else _literals(part)
+    for choice in _choices(kind):
+        if get_origin(choice) is Literal:
+            yield from map(repr, get_args(choice))

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from tvist_shaping._types import Floats, Forked
 from tvist_shaping.delay_line import DelayLine
-from tvist_shaping.errors import FilterError, ShaperFailureError, ShapingError
+from tvist_shaping.errors import FilterError, ShaperFailureError, ShapingError, check_positive
 from tvist_shaping.estimators.base import Estimator
 
 FeedForward: TypeAlias = Literal["rigid", "elastic", "elastic-position"]
@@ -57,7 +57,7 @@ class Filter(Forked, ABC):
         """Initialize what all filters have in common; a derived class then calls `reset`."""
         if joints < 1:
             raise FilterError("joints", joints, "at least 1")
-        FilterError.check_positive(period=period)
+        check_positive(FilterError, "seconds", period=period)
         self.name, self.estimator = name, estimator
         self.joints, self.period, self.peak = joints, period, peak
         self.excess, self.surplus, self.clipped = 0.0, (0.0, 0.0), False

@@ -40,12 +40,12 @@ class ParameterError(ShapingError):
         self.value = value
         self.limit = limit
 
-    @classmethod
-    def check_positive(cls, **values: float) -> None:
-        """Raise this error for the first value that is not finite and above 0."""
-        for field, value in values.items():
-            if not 0.0 < value < math.inf:
-                raise cls(field, value, "a finite number above 0")
+
+def check_positive(error: type[ParameterError], unit: str = "", **values: float) -> None:
+    """Raise an error for the first value that is not finite and above 0."""
+    for field, value in values.items():
+        if not 0.0 < value < math.inf:
+            raise error(field, value, f"a finite number{unit and f' of {unit}'} above 0")
 
 
 class ShaperRangeError(ParameterError):

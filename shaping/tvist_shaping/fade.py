@@ -23,7 +23,7 @@ import numpy.typing as npt
 from tvist_kernels.compiling import compiled
 from tvist_shaping._types import Floats, Forked
 from tvist_shaping.base import Filter
-from tvist_shaping.errors import FilterError
+from tvist_shaping.errors import FilterError, check_positive
 
 NEGLIGIBLE = 1e-10  # difference between two outputs that has no effect [rad]
 ROUNDING = 1e-7  # share of the acceleration limit that the last step to s = 1 may add [-]
@@ -189,7 +189,7 @@ class Fade(Forked):
             FilterError: A limit is out of range, or the filters have different periods.
             ShapingError: The filters have different numbers of joints.
         """
-        FilterError.check_positive(velocity=velocity, acceleration=acceleration, jerk=jerk)
+        check_positive(FilterError, velocity=velocity, acceleration=acceleration, jerk=jerk)
         if old.period != new.period:
             raise FilterError("period", new.period, f"{old.period:g} s, as the filter's it takes over from")
         new.take_over(old)

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from tvist_shaping._types import Floats
 from tvist_shaping.base import Filter
-from tvist_shaping.errors import FilterError, ShaperFailureError
+from tvist_shaping.errors import FilterError, ShaperFailureError, check_positive
 from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.estimators.polynomial import Polynomial
 from tvist_shaping.failures import FAILURES, ROUNDING, failure
@@ -65,7 +65,7 @@ class TvistFilter(Filter):
             EstimatorError: The estimator requires more joints.
             ShaperFailureError: The shaper's function fails for the modes at q = 0.
         """
-        FilterError.check_positive(period=period, max_delay=max_delay)
+        check_positive(FilterError, "seconds", period=period, max_delay=max_delay)
         longest = estimator.modes * shaper.duration_periods / estimator.f_d_min
         if longest > max_delay and estimator.modes * longest_of(shaper, estimator.f_d_min) <= max_delay:
             longest = max_delay

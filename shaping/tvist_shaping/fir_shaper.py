@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvist_shaping._types import Floats
-from tvist_shaping.errors import DesignError, ShaperFailureError
+from tvist_shaping.errors import DesignError, ShaperFailureError, check_positive
 from tvist_shaping.failures import ROUNDING
 from tvist_shaping.impulse_train import Impulses
 from tvist_shaping.steady import Design
@@ -52,7 +52,7 @@ class FirShaper:
             raise DesignError("modes", self.modes, "a whole number from 1 to 8")
         if not 1.0 <= self.peak < np.inf:
             raise DesignError("peak", self.peak, "finite and at least 1")
-        DesignError.check_positive(period=self.period)
+        check_positive(DesignError, "seconds", period=self.period)
 
     def weights(self, f_d: Floats, zeta: Floats) -> Floats:
         """Call `function`, check its result and pad it with zeros, shape (taps,).

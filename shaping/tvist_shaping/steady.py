@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from tvist_shaping._types import Floats, Forked
 from tvist_shaping.base import FeedForward, Filter
-from tvist_shaping.errors import FilterError
+from tvist_shaping.errors import FilterError, check_positive
 from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.failures import FAILURES, failure
 from tvist_shaping.fir import EDGE, GAIN, QUICKEST, FirDesign, Programme, solve
@@ -314,6 +314,6 @@ class AimedFilter(SteadyFilter):
 
 
 def _check_times(mean_delay: float, longest: float, period: float) -> None:
-    FilterError.check_positive(mean_delay=mean_delay, longest=longest, period=period)
+    check_positive(FilterError, "seconds", mean_delay=mean_delay, longest=longest, period=period)
     if mean_delay >= longest:
         raise FilterError("mean_delay", mean_delay, f"less than the longest delay, {longest:g} s")

@@ -19,7 +19,7 @@ from tvist_plant.drives import (
     springs_and_dampers,
     static_twist,
 )
-from tvist_plant.imperfections import STICTION, Imperfections, imperfect_model
+from tvist_plant.imperfections import STICTION, Imperfections, combined, imperfect_model
 from tvist_plant.integrator import rows
 from tvist_plant.model import FlexibleModel, Floats
 from tvist_plant.modes import Modes, modes
@@ -56,7 +56,7 @@ class FlexibleArm(SimulatedArm):
         more = description.imperfections.given().keys() - STICTION
         usual = SUBSTEPS_IF_IMPERFECT if more else SUBSTEPS_OF_A_PERIOD
         self._substeps = usual if substeps is None else substeps
-        self._imperfections = Imperfections.of(description, imperfections)
+        self._imperfections = combined(description, imperfections)
         n = description.joints
         self._width = 3 * n + 3
         self._places = slice(n), slice(n, 2 * n), slice(2 * n, 3 * n), slice(3 * n, None)

@@ -101,7 +101,7 @@ class _StandIn(Plant):
             check_measurement(answer, joints, self.plant)
             felt = () if answer.wrench is None else answer.wrench
             if not np.isfinite(np.concatenate((answer.q, answer.qd, answer.moment, felt))).all():
-                raise PlantError("the arm has measured what is no number")
+                raise PlantError("the arm's measurements are not finite numbers")
 
 
 def check_unpaced(plant: Plant) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 
 import msgspec
 import numpy as np
+from msgspec import Struct, structs
 
 from tvist_plant.robot_tables import (
     MAX_JOINTS,
@@ -139,7 +140,14 @@ def _provenance(description: RobotDescription) -> Iterator[str]:
     for key, origin in description.provenance.items():
         value: object = description
         for part in key.split("."):
-            value = value.get(part) if isinstance(value, dict) else getattr(value, part, None)
+            known = (
+                value
+                if isinstance(value, dict)
+                else structs.asdict(value)
+                if isinstance(value, Struct)
+                else {}
+            )
+            value = known.get(part)
         if value is None or key.startswith("_"):
             yield f"provenance.{key}: there is no such table or key"
         kind, _, words = origin.partition(":")

@@ -5,13 +5,14 @@ from collections.abc import Collection
 from typing import Annotated, Any
 
 import msgspec
-from msgspec import Meta, Struct, structs
+from msgspec import Meta, Struct
 
 from tvist_plant.user_file import UserFileError
 
 Number = Annotated[float, Meta(ge=-1e7, le=1e7)]
 Positive = Annotated[float, Meta(gt=0, le=1e7)]
 NotNegative = Annotated[float, Meta(ge=0, le=1e7)]
+Stiffness = Annotated[float, Meta(gt=0, le=1e12)]
 Vector3 = tuple[Number, Number, Number]
 Placement = tuple[Number, Number, Number, Number, Number, Number]
 Tensor = tuple[NotNegative, Number, Number, NotNegative, Number, NotNegative]
@@ -150,7 +151,7 @@ class Sensors(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
 class YieldingBase(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):
     """A base on springs."""
 
-    stiffness: Positive = 1.5e5  # stiffness about each of the two axes [N m/rad]
+    stiffness: Stiffness = 1.5e5  # stiffness about each of the two axes [N m/rad]
     damping_time: NotNegative = 1e-3  # damping divided by stiffness [s]
     mass: Positive = 20.0  # mass of the ring under the arm [kg]
     radius: Positive = 0.25  # radius of the ring, for its inertia [m]
@@ -172,16 +173,11 @@ class Imperfections(_Table, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     stiction_speed: Positive = 0.03  # v_s: speed over which d decays [rad/s]
     stiction_stiffness: Positive = 27.0  # σ: stiffness of d before it breaks away, divided by the gear's [-]
     base: YieldingBase | None = None  # the yielding base; None for a rigid one
-    torsion: Positive | None = None
+    torsion: Stiffness | None = None
     """Torsional stiffness of each link that bends; None for rigid in torsion [N m/rad]."""
     backlash: tuple[NotNegative, ...] = ()  # b of each joint, half its backlash; empty for none [rad]
     tilt: Annotated[float, Meta(ge=-math.pi / 6, le=math.pi / 6)] = 0.0
     """Angle by which the arm leans about the world's x axis, at most 30 degrees either way [rad]."""
-
-    @classmethod
-    def of(cls, description: "RobotDescription", more: "Imperfections | None" = None) -> "Imperfections":
-        """Return the robot file's imperfections, overridden by values of `more` other than the defaults."""
-        return structs.replace(description.imperfections, **({} if more is None else more.given()))
 
     def given(self) -> dict[str, Any]:
         """Return the values other than the defaults."""

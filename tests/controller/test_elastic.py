@@ -18,7 +18,6 @@ from tvist_controller.trajectory import JointLine, MotionLimits, quickest_motion
 from tvist_plant import description as robot_files
 from tvist_plant.description import Payload
 from tvist_plant.flexible_arm import FlexibleArm
-from tvist_plant.imperfections import Imperfections
 from tvist_plant.integrator import rows
 from tvist_plant.model import flexible_model
 from tvist_plant.robot_tables import RobotDescription
@@ -251,7 +250,7 @@ def test_a_new_shaper_after_a_stop_waits_until_the_motors_have_settled(other):
 
 STICKS = robot_files.load("ur5e_stiction")
 STICKING = load("ur5e_stiction_modal")
-LARGEST = Imperfections.of(STICKS).stiction[0]
+LARGEST = STICKS.imperfections.stiction[0]
 
 
 def rigid(description: RobotDescription) -> RobotDescription:

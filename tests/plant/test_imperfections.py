@@ -64,7 +64,7 @@ def test_reset_repeats_the_same_run(ur5e, drive, imperfections):
 
 
 STICKS = load("ur5e_stiction")
-LAW = Imperfections.of(STICKS)
+LAW = STICKS.imperfections
 
 
 def stiction_of(arm):

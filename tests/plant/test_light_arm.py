@@ -4,14 +4,13 @@ from importlib import resources
 
 import numpy as np
 import pytest
-from msgspec.structs import replace
 
 from tvist_controller.api.line import respond
 from tvist_lab.metrics.ring_down import Ring
 from tvist_lab.study.line import RESTING, ControlLine
 from tvist_plant.description import DescriptionError, Payload, load
 from tvist_plant.flexible_arm import FlexibleArm
-from tvist_plant.imperfections import Imperfections
+from tvist_plant.imperfections import Imperfections, combined
 
 ARM = load("ur5-light")
 SENSOR = Payload(mass=0.4, com=(0.0, 0.0, 0.04), inertia=(4e-4, 0.0, 0.0, 4e-4, 0.0, 4e-4))
@@ -88,10 +87,9 @@ def test_frequency_rises_and_damping_falls_during_the_decay(name, measured):
 
 
 def test_given_imperfections_override_those_of_the_robot_file():
-    assert Imperfections.of(ARM) == Imperfections(hysteresis=0.14, hysteresis_torque=0.003, rotor=3.0)
-    both = Imperfections.of(ARM, Imperfections(breakaway=1.5, hysteresis=0.3))
+    assert ARM.imperfections == Imperfections(hysteresis=0.14, hysteresis_torque=0.003, rotor=3.0)
+    both = combined(ARM, Imperfections(breakaway=1.5, hysteresis=0.3))
     assert both == Imperfections(hysteresis=0.3, hysteresis_torque=0.003, rotor=3.0, breakaway=1.5)
-    assert Imperfections.of(replace(ARM, imperfections=Imperfections())) == Imperfections()
 
 
 @pytest.mark.parametrize(

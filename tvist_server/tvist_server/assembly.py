@@ -58,7 +58,7 @@ def check_together(config: ServeConfig, robots: int) -> None:
         (several and routed and config.endpoints,
          "connect, listen and workers exclude each other: each process connects to the router, so leave listen out"),
         (several and routed and config.metrics is not None,
-         "connect, metrics and workers exclude each other: run one server for each process"),
+         "connect, metrics and workers exclude each other: run one server for each process, each with its own port"),
         (several and own is not None,
          f"listen is {own}, and {workers}: Unix sockets are for the server's own processes, so listen on tcp/ or tls/"),
     ):  # fmt: skip

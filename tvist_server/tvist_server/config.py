@@ -191,10 +191,7 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
         if not real:
             given = [name for name in _REAL if getattr(self, name)]
             if given:
-                value = getattr(self, given[0])
-                raise ValueError(
-                    f"{given[0]} is {value}: needs a real UR robot, so also give --plant ur://ADDRESS"
-                )
+                raise ValueError(f"{given[0]} needs a real UR robot: also give --plant ur://ADDRESS")
             return
         asked: dict[str, object] = {
             "adapt": self.adapt, "cell": self.cell, "state": self.state, "truth": self.truth or None,

@@ -11,7 +11,7 @@ from tvist_controller.planning.filter_planner import FilterPlanner
 from tvist_controller.planning.plan import CommandCall, CommandRow, Planning
 from tvist_controller.planning.reachable import Reachable
 from tvist_controller.planning.snapshot import FILTER, TOOL
-from tvist_controller.refusal import RefusalError, check_body, check_joints, out_of_range, wrong_mode
+from tvist_controller.refusal import RefusalError, check_body, check_joints, invalid, wrong_mode
 from tvist_controller.safety.faults import check_fault
 from tvist_controller.setup import body, payload_of
 from tvist_plant.description import RobotDescription
@@ -29,7 +29,7 @@ from tvist_protocol.values import PROTOCOL_VERSION
 def _check_version(command: c.TakeControl | c.TakeClock, _: RobotDescription) -> None:
     if command.protocol != PROTOCOL_VERSION:
         must = f"{PROTOCOL_VERSION}, the version of this server"
-        raise out_of_range("protocol", command.protocol, must, PROTOCOL_VERSION, "unsupported_version")
+        raise invalid("protocol", command.protocol, must, PROTOCOL_VERSION, "unsupported_version")
 
 
 def _take_control(robot: RobotParts, call: CommandCall[c.TakeControl]) -> Reply:

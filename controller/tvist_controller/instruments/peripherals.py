@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import Any, get_args
 
-from tvist_controller.refusal import missing, out_of_range
+from tvist_controller.refusal import invalid, missing
 from tvist_protocol.io import (
     BITS,
     NUMBERS,
@@ -148,7 +148,7 @@ class Peripherals:
             there = BITS if run.bank.endswith("bit") else NUMBERS
             if run.first + len(run.values) > there:
                 count = f"{len(run.values)} values from register {run.first}"
-                raise out_of_range(where, count, f"within the {there} registers of {run.bank}", there)
+                raise invalid(where, count, f"within the {there} registers of {run.bank}", there)
             for k, value in enumerate(run.values):
                 _check(f"{where}[{k}]", value, run.bank)
         for run in runs:
@@ -218,4 +218,4 @@ def _check(where: str, value: Register, bank: Bank) -> None:
     else:
         fits, wanted = not isinstance(value, bool), "a number"
     if not fits:
-        raise out_of_range(where, value, f"{wanted} for {bank} registers")
+        raise invalid(where, value, f"{wanted} for {bank} registers")

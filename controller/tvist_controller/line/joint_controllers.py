@@ -9,7 +9,6 @@ from tvist_controller.line.differentiator import Floats
 from tvist_kernels.compiling import inlined
 from tvist_plant.description import RobotDescription
 from tvist_plant.drives import joint_parameters
-from tvist_plant.imperfections import Imperfections
 from tvist_plant.plant import PERIOD
 from tvist_plant.stiction import stiction_after
 
@@ -98,7 +97,7 @@ def joint_rows(description: RobotDescription, *, compensate_sag: bool, positions
 
 def described_friction(description: RobotDescription) -> Floats | None:
     """Return the described friction of an arm with stiction, rows as `LAWS`, shape (9, n); else None."""
-    sticks, drives = joint_parameters(description, Imperfections.of(description)), description.drives
+    sticks, drives = joint_parameters(description, description.imperfections), description.drives
     if not sticks.stiction_load.any() and not sticks.stiction.any():
         return None
     F_c, w, linear = np.array(drives.coulomb_friction), drives.friction_width, drives.linear_friction

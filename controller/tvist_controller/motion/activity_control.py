@@ -23,7 +23,7 @@ from tvist_controller.motion.safety_system import PUT, RUNTIME, SafetySystem
 from tvist_controller.motion.setpoints import Setpoints
 from tvist_controller.planning.move_planner import PlannedMove
 from tvist_controller.planning.snapshot import FilterState, PlanningState
-from tvist_controller.refusal import out_of_range, out_of_turn, wrong_mode
+from tvist_controller.refusal import invalid, out_of_turn, wrong_mode
 from tvist_controller.trajectory import MotionLimits, SetpointStream
 from tvist_protocol.modes import RuntimeState, SafetyMode
 from tvist_protocol.replies import Code
@@ -172,7 +172,7 @@ class MotionControl:
         target = self.check("servo_start")
         if (most := self.motions.slowest) is not None and limits.velocity > most:
             must = f"at most {most:.3g} rad/s while safety_mode is REDUCED"
-            raise out_of_range("velocity", f"{limits.velocity:g} rad/s", must, most, "limit_velocity")
+            raise invalid("velocity", f"{limits.velocity:g} rad/s", must, most, "limit_velocity")
         self.activity = target
         self.streams.begin(self._stream(period, limits), now)
 

@@ -10,7 +10,7 @@ from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.limits import GENTLEST_STOP, REBOUND, StreamTorqueMargin, arm_limits
 from tvist_controller.line.line_mode import LineMode
 from tvist_controller.motion.activity_control import MotionControl
-from tvist_controller.refusal import out_of_range
+from tvist_controller.refusal import invalid
 from tvist_controller.trajectory import Compliant, Guided, MotionLimits, ServoFollower, Speed
 from tvist_protocol.transitions import Activity
 
@@ -117,9 +117,7 @@ class Guidance:
         """Raise RefusalError if the present activity does not allow a command."""
         self.motion.check(trigger)
         if shaped and self.motion.activity is not Activity.REST and not self._continues(shaped):
-            raise out_of_range(
-                "shaped", "true", "false, since this motion does not begin at rest", code="busy"
-            )
+            raise invalid("shaped", "true", "false, since this motion does not begin at rest", code="busy")
 
     def _continues(self, shaped: bool) -> bool:
         """Return whether a command continues the previous one's reference."""

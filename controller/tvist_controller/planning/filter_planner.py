@@ -11,7 +11,7 @@ from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
 from tvist_controller.line.limits import arm_limits
 from tvist_controller.planning.snapshot import FilterState, PlanningState
-from tvist_controller.refusal import RefusalError, missing, out_of_range
+from tvist_controller.refusal import RefusalError, invalid, missing
 from tvist_controller.setup import Setup, paper_payload
 from tvist_controller.sources.calibrations import available, elastic_feed_forward, known_friction, load
 from tvist_controller.sources.mode_source import ModeSource, modal_source
@@ -169,7 +169,7 @@ def wanted_modes(name: str, modes: int, where: str, known: Registry = BUILT_IN) 
     with _refusing(where):
         own = known.modes_of(name, modes)
     if modes not in {1, own}:
-        raise out_of_range("modes", modes, f"{own} for the filter {name}", own)
+        raise invalid("modes", modes, f"{own} for the filter {name}, or left out", own)
     return own
 
 
@@ -193,14 +193,14 @@ def choose_source(command: SetEstimator, setup: Setup) -> ModeSource:
         return _fixed(command, setup)
     if command.name not in ESTIMATORS:
         must = f"one of {', '.join(ESTIMATORS)}"
-        raise out_of_range("name", repr(command.name), must, code="unknown_estimator")
+        raise invalid("name", repr(command.name), must, code="unknown_estimator")
     for field in ("f_d", "zeta"):
         if getattr(command, field) is not None:
-            raise out_of_range(field, "given", f"left out for the estimator {command.name}")
+            raise invalid(field, "given", f"left out for the estimator {command.name}")
     calibration = _calibration(command, setup)
     if calibration.robot != setup.description.robot.model:
         must = f"{setup.description.robot.model!r}, this arm's model"
-        raise out_of_range("calibration.robot", repr(calibration.robot), must)
+        raise invalid("calibration.robot", repr(calibration.robot), must)
     source = ModeSource("modal" if command.name == "modal" else "polynomial", setup.description, calibration)
     with _refusing("calibration", "calibration: "):
         source.estimator(1, setup.payload)
@@ -212,7 +212,7 @@ def _fixed(command: SetEstimator, setup: Setup) -> ModeSource:
     if f_d is None or zeta is None:
         raise missing("f_d" if f_d is None else "zeta", "the estimator fixed needs f_d and zeta")
     if command.calibration is not None:
-        raise out_of_range("calibration", "given", "left out for the estimator fixed")
+        raise invalid("calibration", "given", "left out for the estimator fixed")
     with _refusing("zeta"):
         Fixed(f_d, zeta)
     return ModeSource("fixed", setup.description, f_d=f_d, zeta=zeta)
@@ -235,7 +235,7 @@ def _calibration(command: SetEstimator, setup: Setup) -> Calibration:
         return own
     if command.calibration not in available():
         must = f"one of {', '.join(available())}"
-        raise out_of_range("calibration", repr(command.calibration), must, code="unknown_calibration")
+        raise invalid("calibration", repr(command.calibration), must, code="unknown_calibration")
     return load(command.calibration)
 
 

@@ -10,7 +10,7 @@ from typing import Final, Literal, NamedTuple
 from tvist_controller.programs.functions.unsimulated import SUBJECTS
 from tvist_controller.programs.interpreter import WAITS
 from tvist_controller.programs.library import MOVING, known_signatures
-from tvist_controller.refusal import RefusalError, out_of_range, wrong_mode
+from tvist_controller.refusal import RefusalError, invalid, wrong_mode
 from tvist_plant.description import RobotDescription
 from tvist_protocol.programs import ProgramLoad, ProgramRun
 from tvist_urscript import METHOD, PURE, Script, ScriptError, check, compile_script
@@ -121,7 +121,7 @@ class KeptPrograms:
     def find(self, name: str) -> Kept:
         """Return a stored program."""
         if name not in self._kept:
-            raise out_of_range("name", repr(name), f"one of {', '.join(self.names)}")
+            raise invalid("name", repr(name), f"one of {', '.join(self.names)}")
         return self._kept[name]
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tvist_controller.motion.activity_control import MotionControl
-from tvist_controller.refusal import RefusalError, missing, out_of_range
+from tvist_controller.refusal import RefusalError, invalid, missing
 from tvist_controller.safety.safety_control import SafetyControl
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD, Plant
@@ -23,15 +23,15 @@ def check_fault(command: SimulationInject, description: RobotDescription) -> Non
     joints = description.joints
     fault = FAULTS.get(command.fault)
     if fault is None:
-        raise out_of_range("fault", repr(command.fault), f"one of {', '.join(FAULTS)}", code="unknown_fault")
+        raise invalid("fault", repr(command.fault), f"one of {', '.join(FAULTS)}", code="unknown_fault")
     for field in ("joint", "value", "seconds"):
         given = getattr(command, field) is not None
         if field in fault.needs and not given:
             raise missing(field, f"fault {command.fault} needs it")
         if given and field not in (*fault.needs, *fault.may):
-            raise out_of_range(field, "given", f"left out for fault {command.fault}")
+            raise invalid(field, "given", f"left out for fault {command.fault}")
     if command.joint is not None and command.joint >= joints:
-        raise out_of_range("joint", command.joint, f"from 0 to {joints - 1}", joints - 1)
+        raise invalid("joint", command.joint, f"from 0 to {joints - 1}", joints - 1)
 
 
 _NEEDED: dict[str, Callable[..., Any]] = {"torque": Plant.push, "nan": Plant.make_nan}

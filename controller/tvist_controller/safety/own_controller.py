@@ -7,7 +7,7 @@ from tvist_controller.instruments.peripherals import Peripherals
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.line_tick import Sample
 from tvist_controller.motion.activity_control import MotionControl
-from tvist_controller.refusal import out_of_range, wrong_mode
+from tvist_controller.refusal import invalid, wrong_mode
 from tvist_controller.safety.robot_modes import RobotModes
 from tvist_controller.safety.safety_control import SafetyControl
 from tvist_controller.setup import payload_of
@@ -148,8 +148,8 @@ class Supervision(RemoteStatus):
             )
         told = None if self._sight is None else self._sight.payload
         if isinstance(command, SetPayload) and told is not None and abs(command.mass - told.mass) > SAME_MASS:
-            must = f"{told.mass:.3g} kg, which is set on the robot: change it there first"
-            raise out_of_range("mass", f"{command.mass:.3g} kg", must, code="wrong_mode")
+            must = f"{told.mass:.3g} kg, as set on the robot; to change it, set it there first"
+            raise invalid("mass", f"{command.mass:.3g} kg", must, code="wrong_mode")
 
     def io(self, io: Io, *, force: bool) -> Io:
         """Return `io` with the robot's own values, except what clients set here."""

@@ -91,8 +91,8 @@ def load_plant(place: str) -> OwnPlant:
         return OwnPlant(place, "", VARIANTS[place])
     if place.lower().startswith("ur://"):
         raise OwnFileError(
-            f"plant is {place!r}, a real arm, which only tvist serve takes: its motions cannot be repeated for a "
-            "replay or a comparison"
+            f"plant is {place!r}, a real arm, which cannot repeat motions for a replay or a comparison: use it with "
+            "tvist serve, or give a simulated plant"
         )
     if place.startswith(WORLD):
         return load_world(place.removeprefix(WORLD))

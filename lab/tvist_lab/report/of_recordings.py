@@ -199,12 +199,17 @@ def _missing(files: Sequence[_File], panels: Sequence[ComparedPanel]) -> list[st
     return items
 
 
+def _sha256(path: Path) -> str:
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
 def _provenance(file: _File) -> Mapping[str, str]:
     recording = file.measured.recording
     facts = {"File": str(file.path)}
     there = [place for place in files_of(file.path) if place.is_file()]
     if there:
-        facts["SHA-256"] = ", ".join(hashlib.sha256(place.read_bytes()).hexdigest() for place in there)
+        facts["SHA-256"] = ", ".join(map(_sha256, there))
         facts["Size"] = f"{sum(place.stat().st_size for place in there)} bytes"
     facts["Rows"] = (
         f"{len(recording)}, one every {1e3 * recording.period:g} ms, from {recording.time[0]:.3f} to "

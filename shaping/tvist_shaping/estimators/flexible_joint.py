@@ -16,7 +16,7 @@ from collections.abc import Callable
 import numpy as np
 
 from tvist_shaping._types import Floats
-from tvist_shaping.errors import EstimatorError
+from tvist_shaping.errors import EstimatorError, check_positive
 from tvist_shaping.estimators.base import Estimator
 
 
@@ -31,7 +31,7 @@ def flexible_joint(inertia: float, stiffness: float, damping: float) -> tuple[fl
     Raises:
         EstimatorError: A value is out of range, or so much damping leaves no vibration.
     """
-    EstimatorError.check_positive(inertia=inertia, stiffness=stiffness)
+    check_positive(EstimatorError, inertia=inertia, stiffness=stiffness)
     critical = 2.0 * math.sqrt(stiffness * inertia)
     if not 0.0 <= damping < critical:
         raise EstimatorError(

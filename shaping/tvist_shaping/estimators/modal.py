@@ -17,7 +17,7 @@ import numpy as np
 
 from tvist_kernels.compiling import compiled
 from tvist_shaping._types import Floats
-from tvist_shaping.errors import EstimatorError
+from tvist_shaping.errors import EstimatorError, check_positive
 from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.estimators.drivetrain import Drivetrain
 from tvist_shaping.estimators.poles import Complex, follow
@@ -92,7 +92,7 @@ class Modal(Estimator):
         size = len(drivetrain.stiffness)
         if not 1 <= modes <= size:
             raise EstimatorError("modes", modes, f"1 to {size}, the number of coordinates")
-        EstimatorError.check_positive(f_d_min=f_d_min)
+        check_positive(EstimatorError, "Hz", f_d_min=f_d_min)
         if not 0.0 < zeta_max < 1.0:
             raise EstimatorError("zeta_max", zeta_max, "between 0 and 1")
         self.drivetrain = drivetrain

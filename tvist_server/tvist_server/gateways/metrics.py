@@ -115,7 +115,7 @@ def _figures() -> Iterator[Figure]:
 def _fields(source: str, fields: Mapping[str, str], unit: float, of: MetricsGateway) -> dict[str, float]:
     """Return a robot's fields of a message that are known, by their keys in `fields`."""
     message = getattr(of, source)
-    found = {key: getattr(message, field, None) for key, field in fields.items()}
+    found = {key: getattr(message, field) for key, field in fields.items() if message is not None}
     return {key: unit * value for key, value in found.items() if value is not None}
 
 

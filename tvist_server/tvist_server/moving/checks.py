@@ -149,8 +149,8 @@ def _load_trouble(expected: Expected, sight: Sight) -> str | None:
     told, tool = sight.payload, sight.tool
     if told is not None and abs(told.mass - expected.payload.mass) > SAME_MASS:
         return (
-            f"it was told a payload of {told.mass:.3g} kg, and here it is {expected.payload.mass:.3g} kg: give "
-            "--payload what the arm carries, and tell the robot the same"
+            f"its payload is set to {told.mass:.3g} kg, and here it is {expected.payload.mass:.3g} kg: give "
+            "--payload what the arm carries, and set the same on the robot"
         )
     if tool is not None and expected.tool is not None:
         apart = np.abs(np.array(tool) - np.array(expected.tool))

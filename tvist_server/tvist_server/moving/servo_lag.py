@@ -55,7 +55,7 @@ class ServoSetpoints:
             acceleration = (command.qd - self._qd) / PERIOD
             wanted = 0.5 * (command.q + self._q) + lag.time * velocity + acceleration / lag.gain
         if not np.isfinite(wanted).all():
-            raise PlantError("a set-point is no number: it is not sent")
+            raise PlantError("a set-point is not a finite number: it is not sent")
         self._q, self._qd = command.q, command.qd
         within = np.clip(wanted, -self._reach, self._reach)
         sent = np.clip(within, self._sent - self._most, self._sent + self._most)
