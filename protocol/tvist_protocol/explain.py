@@ -132,7 +132,7 @@ def _tag(fault: _Fault) -> ProtocolError:
 
 
 def _kind(fault: _Fault, wanted: str, got: str) -> ProtocolError:
-    if isinstance(fault.value, str | int | float):
+    if isinstance(fault.value, str | int | float) and got not in {"bool", "bytes"}:
         why = f"{fault.whole} is {quoted(fault.value)}: must be {_kinds(wanted)}"
     else:
         why = f"{fault.whole} must be {_kinds(wanted)}, not {_kinds(got)}"

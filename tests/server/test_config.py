@@ -200,7 +200,7 @@ def test_a_setup_is_restored_from_its_recording_only_if_it_is_complete():
 def test_a_setup_is_checked_against_the_number_of_joints(joints):
     description = cut(joints)
     setup(description).check()
-    with pytest.raises(ValueError, match=f"{joints} joints"):
+    with pytest.raises(ValueError, match=f"must be {joints}"):
         setup(description, q=(0.0,) * (joints + 1)).check()
 
 

@@ -143,7 +143,7 @@ def turned(joint, by, target=Q):
         ({"modes": (RobotMode.DISCONNECTED, SafetyMode.NORMAL, 1)}, "not connected"),
         ({"target": np.array([Q, turned(2, 0.1, np.zeros(6)), *np.zeros((2, 6))])}, "it moves"),
         ({"target": np.array([turned(3, 0.011), *np.zeros((3, 6))])}, "joint 3 is 0.011 rad from where"),
-        ({"payload": Payload(mass=4.9)}, "payload of 4.9 kg, and here it is 5 kg"),
+        ({"payload": Payload(mass=4.9)}, "payload is set to 4.9 kg, and here it is 5 kg"),
     ],
 )
 def test_a_robot_in_an_unsuitable_state_is_not_moved(changes, words):

@@ -127,7 +127,7 @@ def test_a_run_with_an_own_plant_is_recorded_and_replayed(tmp_path, place):
     content.start["plant"] = {"place": real, "sha256": ""}
     with pytest.raises(ReplayError, match="it cannot be replayed"):
         replay_file(content)
-    with pytest.raises(OwnFileError, match="only tvist serve takes"):
+    with pytest.raises(OwnFileError, match="use it with tvist serve"):
         load_plant(real)
 
 

@@ -236,7 +236,7 @@ def test_a_failure_prints_one_message_and_exits_with_code_1(called, tmp_path, ar
 
 
 FILES = [
-    ("--config", "x.toml", "payload = true", ["payload is True: must be a number"]),
+    ("--config", "x.toml", "payload = true", ["payload must be a number", "not a boolean"]),
     ("--config", "x.toml", "shapr = 'zv'", ["'shapr'", "did you mean 'shaper'?"]),
     ("--config", "x.toml", "payload =", ["not valid TOML", "end of document"]),
     ("--config", "x.toml", f"poses = {'[' * 100_000}", ["is nested too deeply"]),
