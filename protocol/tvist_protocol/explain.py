@@ -149,6 +149,7 @@ _RULES: tuple[tuple[re.Pattern[str], Callable[..., ProtocolError]], ...] = (
     (re.compile(r"Invalid enum value .*", re.DOTALL), _choice),
     (re.compile(r"Invalid value .*", re.DOTALL), _tag),
     (re.compile(r"Expected `([^`]*)`, got `([^`]*)`"), _kind),
+    (re.compile(r"Number out of range"), lambda fault: fault.out_of_range("a number within ±1.8e308")),
 )
 _RELATIONS = {">= ": "at least", "<= ": "at most", "> ": "more than", "< ": "less than", "": "exactly"}
 _KINDS = {

@@ -46,6 +46,10 @@ def check_together(config: ServeConfig, robots: int) -> None:
     config.dump_folder()
     config.program_folder(config.name)
     AllowedHosts(config.ur_allow)
+    if config.reserve_inputs:
+        from tvist_server.gateways.ur.rtde.variables import matching  # it is slow to import
+
+        matching(config.reserve_inputs)
     several, routed = config.workers > 1, bool(config.connect)
     own = next((one for one in config.endpoints if one.startswith(LOCAL)), None)
     workers = f"workers is {config.workers}"
