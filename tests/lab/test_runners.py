@@ -41,7 +41,7 @@ def importable(monkeypatch):
     monkeypatch.syspath_prepend(ROOT)
 
 
-def test_rows_do_not_depend_on_the_executor(ur5e):
+def test_study_results_are_equal_in_one_and_in_several_processes(ur5e):
     methods = some(["zv"], ur5e, load_calibration("ur5e_5kg"))
     moves = draw_moves(ur5e, 2, 1, (0.0, 5.0)).moves
     cases = [Case(ur5e, move, seed) for seed, move in enumerate(moves)]

@@ -89,7 +89,7 @@ def whole(tmp_path, tasks):
     return run(tasks, tmp_path / "whole", Quick()).rows
 
 
-def test_missing_key_has_a_default(tmp_path):
+def test_sweep_settings_that_are_left_out_have_defaults(tmp_path):
     spec = tasks_of(tmp_path, "shapers = ['zv']\nmoves = 1\npayloads = [5]").cases.spec
     assert (spec.robots, spec.seed, spec.modes, spec.limits) == (("ur5e",), 0, 1, "gentle")
     assert (spec.stroke, spec.wrists, spec.streams) == ((0.3, 1.0), False, False)
@@ -257,7 +257,7 @@ def of_the_page():
     return next(text for text in shown if "STUDY" in text)
 
 
-def test_study_of_the_page_runs(tmp_path):
+def test_the_example_study_in_the_guide_runs(tmp_path):
     text = of_the_page()
     (tmp_path / "speeds.py").write_text(text.replace("20, seed", "1, seed"), encoding="utf-8")
     study = read_study(tmp_path / "speeds.py")

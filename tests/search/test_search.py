@@ -70,7 +70,7 @@ def test_stream_keeps_clearance_and_limits_however_it_ends(arm, number):
 
 
 @pytest.mark.search
-def test_random_commands_keep_every_promise(arm, number):
+def test_random_commands_keep_limits_clearance_and_reproducibility(arm, number):
     sequences.Sequence(arm, number).run()
 
 

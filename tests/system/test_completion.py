@@ -92,7 +92,9 @@ def test_fish_completes_the_last_word(typed, folder):
 
 
 @pytest.mark.parametrize(("annotation", "typed", "wanted"), VALUES)
-def test_a_value_is_completed(annotation, typed, wanted, folder, monkeypatch):
+def test_completion_offers_the_valid_values_of_each_kind_of_option(
+    annotation, typed, wanted, folder, monkeypatch
+):
     monkeypatch.chdir(folder)
     names = annotation.completer(SimpleNamespace(incomplete=typed))
     assert {name for name in names if name.startswith(typed)} == wanted
