@@ -257,11 +257,12 @@ def of_the_page():
     return next(text for text in shown if "STUDY" in text)
 
 
-def test_the_example_study_in_the_guide_runs(tmp_path):
+@pytest.mark.parametrize("number", [1, pytest.param(2, marks=pytest.mark.nightly)])
+def test_the_example_study_in_the_guide_runs(tmp_path, number):
     text = of_the_page()
     (tmp_path / "speeds.py").write_text(text.replace("20, seed", "1, seed"), encoding="utf-8")
     study = read_study(tmp_path / "speeds.py")
-    ran = run_study(study, tmp_path / "x", lambda: processes(1))
+    ran = run_study(study, tmp_path / "x", lambda: processes(number))
     assert run(study, tmp_path / "x", Quick()).resumed == 3
     entries = study.summary(ran.rows)
     assert [(one["speed"], one["shaper"]) for one in entries] == [

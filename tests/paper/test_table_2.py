@@ -77,7 +77,14 @@ def test_each_baseline_shaper_brings_the_arm_to_rest_with_its_expected_delay(don
 
 
 def test_page_has_the_origin_of_every_result(done):
-    text = page_of("paper", {**as_dict(done), "others": [as_dict(done)]})
+    mine = as_dict(done)
+    others = [row | {"here": "so much", "origin": "tuned"} for row in mine["origins"]]
+    text = page_of("paper", {**mine, "others": [{**mine, "robot": "another", "origins": others}]})
+    assert "| figure | paper | UR5e | origin | another | origin |" in text
+    for row in mine["origins"]:
+        own = " | ".join(row[key] for key in ("figure", "paper", "here", "origin"))
+        assert f"| {own} | so much | tuned |" in text
+    assert f"- `another` matches {len(others)} of {len(others)} figures" in text
     for word in ("fitted", "tuned", "predicted", "not matched"):
         assert f"| {word} |" in text
 
