@@ -103,12 +103,17 @@ def sent(host, wanted):
     return command if getattr(wanted, "token", None) is None else msgspec.structs.replace(command, **T)
 
 
+def type_of(name):
+    """The type of the message that a method sends."""
+    if name == "close_popup" or name.endswith("_program"):
+        return f"program.{name.removesuffix('_program')}"
+    return f"simulation.{name}" if name in {"reset", "inject"} else name
+
+
 def golden(name):
     """The golden message of a method, its arguments, and an answer to it."""
     kind, carry_out = SENT[name]._kind, SENT[name]._carry_out
-    fields = json.loads(
-        (FOLDER / "fixtures/v1" / f"{kind.__struct_config__.tag}.json").read_text(encoding="utf-8")
-    )
+    fields = json.loads((FOLDER / "fixtures/v1" / f"{type_of(name)}.json").read_text(encoding="utf-8"))
     given = {key: value for key, value in fields.items() if key in arguments(kind)}
     more = {"wait": False} if carry_out is move else {}
     answers = {"inverse_kinematics": POSTURE, "forward_kinematics": TOOL}
@@ -124,6 +129,7 @@ async def test_a_method_sends_its_command(host, robot, name):
     async with robot.control("me") as arm:
         result = await getattr(arm if name in vars(Commands) else robot, name)(**given)
     assert sent(host, wanted) == wanted
+    assert tag(wanted) == type_of(name)
     if name in vars(Questions):
         assert (result,) == msgspec.structs.astuple(answer)
 

@@ -13,6 +13,7 @@ from .served import Served, free_endpoint
 from .wire import PATIENCE, PLAYING, Q1, STATE_FIELDS, STOPPED, TICK, Wire
 
 Q_NEAR = [angle + 0.1 for angle in Q1]
+BENT = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]
 SCHEMAS = Path(__file__).parents[2] / "protocol" / "schemas"
 
 
@@ -105,6 +106,35 @@ class TestMotion:
         told = [event["kind"] for event in live.received["event"] if event.get("id") == answer["id"]]
         assert told == ["motion_started", "motion_stopped"]
 
+    def test_a_line_is_straight_and_ends_at_its_pose(self, stepped):
+        def pose_at(q):
+            return stepped.command("forward_kinematics", q=q)["pose"]
+
+        stepped.listen("state", "event")
+        x, y, z, *rotation = start = pose_at(BENT)
+        goal = [x + 0.1, y + 0.1, z - 0.05, *rotation]
+        with stepped.control() as token:
+            stepped.command("simulation.reset", token=token, q=BENT, seed=0)
+            before = stepped.step(token, 1)["tick"]
+            answer = stepped.command("move_l", token=token, pose=goal)
+            while (last := stepped.step(token, 100))["runtime_state"] != STOPPED:
+                pass
+            stepped.wait(
+                "event", lambda event: (event["kind"], event.get("id")) == ("motion_done", answer["id"])
+            )
+        told = [event["kind"] for event in stepped.received["event"] if event.get("id") == answer["id"]]
+        assert told == ["motion_started", "motion_done"]
+        assert pose_at(last["target_q"]) == pytest.approx(goal, abs=1e-9)
+        inside = stepped.command("forward_kinematics", q=last["target_q"], frame=goal)
+        assert inside["pose"] == pytest.approx([0.0] * 6, abs=1e-9)
+        way = math.dist(goal[:3], start[:3])
+        states = [state for state in stepped.received["state"] if before <= state["tick"] <= last["tick"]]
+        for state in states[::50]:
+            at = pose_at(state["target_q"])
+            there, left = math.dist(at[:3], start[:3]), math.dist(at[:3], goal[:3])
+            assert there + left == pytest.approx(way, abs=1e-5)
+            assert at[3:] == pytest.approx(rotation, abs=1e-5)
+
     def test_a_stream_is_played_and_its_sequence_is_published(self, stepped):
         with stepped.control() as token:
             assert stepped.command("servo_start", token=token) == {"type": "done"}
@@ -153,12 +183,11 @@ class TestControl:
         assert state["target_qd"] == [0.0] * 6
 
     def test_kinematics_are_answered_without_control(self, stepped):
-        bent = [0.0, -1.57, 1.57, -1.57, -1.57, 0.0]
-        pose = stepped.command("forward_kinematics", q=bent)
-        answer = stepped.command("inverse_kinematics", pose=pose["pose"], near=bent)
+        pose = stepped.command("forward_kinematics", q=BENT)
+        answer = stepped.command("inverse_kinematics", pose=pose["pose"], near=BENT)
         validate(pose)
         validate(answer)
-        assert answer["q"] == pytest.approx(bent, abs=1e-9)
+        assert answer["q"] == pytest.approx(BENT, abs=1e-9)
         refused = stepped.command("inverse_kinematics", pose=[2.0, 0.0, 0.0, 0.0, 0.0, 0.0])
         assert (refused["type"], refused["code"], refused["where"]) == ("refused", "no_solution", "pose")
 

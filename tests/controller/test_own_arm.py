@@ -469,7 +469,7 @@ def test_commands_that_would_not_reach_the_robot_are_refused(robot):
         assert words in reply.why
 
 
-def test_positions_sent_to_a_real_arm_exclude_wind_up(robot, arm):
+def test_positions_sent_to_a_real_arm_are_not_corrected_for_gear_twist(robot, arm):
     let_move(robot, arm)
     targets = [state.target_q for state in robot.states if state.tick > 10]
     assert np.array(arm.sent[-150:]) == pytest.approx(np.array(targets[-150:]), abs=1e-12)

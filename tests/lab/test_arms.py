@@ -36,7 +36,7 @@ def test_every_table_of_a_robot_file_has_a_provenance():
         assert {"kinematics", "links", "limits", "drives"} <= told, name
 
 
-def test_auto_reduces_vibration_of_three_arms_without_settings():
+def test_shaper_auto_reduces_vibration_of_three_arms_by_default():
     """By the command that the reference page names, with fewer moves."""
     command = ("robots", "ur3e", "ur10e", "ur20", "--measure", "--random", "4", "--json")
     ended = finished("-m", "tvist_cli", *command)

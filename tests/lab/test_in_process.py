@@ -7,7 +7,7 @@ from tvist_server.config import ServeConfig
 from tvist_server.option_values import StartError
 
 
-def test_changes_apply_to_the_default_and_to_a_configuration():
+def test_given_options_override_the_configuration_in_process():
     for config in (None, ServeConfig(seed=1, shaper="ei"), ServeConfig()):
         found = free_setup(config, seed=7, shaper="zvd", start="Q2")
         assert (found.seed, found.shaper) == (7, "zvd")

@@ -305,7 +305,7 @@ def test_vibration_at_the_end_is_not_called_noise(tmp_path):
     assert "noise" in noisy.notes["still_after_ms"]
 
 
-def test_notes_count_motions():
+def test_equal_notes_are_merged_with_the_number_of_motions():
     results = [MotionResult(0.0, 1.0, notes={"f_d_hz": f"only 0.{n} s"} if n < 8 else {}) for n in range(10)]
     assert grouped_notes(results) == ["8 of 10 motions, frequency: as only 0.0 s"]
 

@@ -74,7 +74,7 @@ def test_stopped_motion_is_marked_and_an_empty_one_omitted(one_motion, event):
     assert motion.stopped
 
 
-def test_rest_separates_motions(make_recording):
+def test_a_rest_of_the_reference_starts_a_new_motion(make_recording):
     reference = steps((100, 300), (400, 500))
     found = [
         (one.start, one.reference_stop, one.end) for one in motions(make_recording(reference, reference))

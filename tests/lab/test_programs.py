@@ -40,7 +40,7 @@ def said(watch, kind="text"):
     return [one.text for one in watch.said if one.kind == kind]
 
 
-def test_program_that_ends_is_finished():
+def test_a_completed_program_is_reported_as_finished_with_its_duration():
     watch = run("sleep(0.3)", 'textmsg("slept")', "sleep(0.2)")
     assert (watch.name, watch.reason, watch.why) == ("prog", "finished", None)
     assert watch.seconds == pytest.approx(0.5)

@@ -33,7 +33,7 @@ def _block(request, monkeypatch):
 
 
 @pytest.mark.parametrize("name", ["faults", "live_lost_lease"])
-def test_columns_of_real_recordings(name):
+def test_columns_of_recordings_equal_their_decoded_messages(name):
     assert equals_objects(read(JOURNALS / f"{name}.mcap"))
 
 

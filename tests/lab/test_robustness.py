@@ -85,7 +85,7 @@ def test_few_moves_give_no_5th_percentile_and_seeds_are_held_out():
     assert "Nothing is tuned on seed 20261123" in said(JUDGING["robustness"])
 
 
-def test_smoothing_alone_is_elastic_without_feed_forward(ur5e):
+def test_smoothing_uses_the_elastic_shapers_path_without_feed_forward(ur5e):
     wanted = asked(ur5e, "smoothing", "elastic")
     task = Task(ur5e, wanted.moves[0], Case(ur5e, wanted.moves[0]).reference())
     alone, elastic = (method.shaped(task) for method in wanted.methods)

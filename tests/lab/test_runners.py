@@ -41,14 +41,15 @@ def importable(monkeypatch):
     monkeypatch.syspath_prepend(ROOT)
 
 
-def test_rows_do_not_depend_on_the_executor(ur5e):
+@pytest.mark.parametrize("number", [1, pytest.param(2, marks=pytest.mark.nightly)])
+def test_study_results_are_equal_in_one_and_in_several_processes(ur5e, number):
     methods = some(["zv"], ur5e, load_calibration("ur5e_5kg"))
     moves = draw_moves(ur5e, 2, 1, (0.0, 5.0)).moves
     cases = [Case(ur5e, move, seed) for seed, move in enumerate(moves)]
     study = Study(title="", cases=cases, methods=methods)
     here = [{"case": place, **row} for place, job in enumerate(study.jobs()) for row in measure(job)]
     assert_frame_equal(run(study).rows, study.frame(here))
-    assert_frame_equal(run(study, executor=lambda: processes(1)).rows, study.frame(here))
+    assert_frame_equal(run(study, executor=lambda: processes(number)).rows, study.frame(here))
 
 
 @pytest.mark.parametrize("executor", EXECUTORS.values(), ids=EXECUTORS)

@@ -89,7 +89,7 @@ def whole(tmp_path, tasks):
     return run(tasks, tmp_path / "whole", Quick()).rows
 
 
-def test_missing_key_has_a_default(tmp_path):
+def test_sweep_settings_that_are_left_out_have_defaults(tmp_path):
     spec = tasks_of(tmp_path, "shapers = ['zv']\nmoves = 1\npayloads = [5]").cases.spec
     assert (spec.robots, spec.seed, spec.modes, spec.limits) == (("ur5e",), 0, 1, "gentle")
     assert (spec.stroke, spec.wrists, spec.streams) == ((0.3, 1.0), False, False)
@@ -257,11 +257,12 @@ def of_the_page():
     return next(text for text in shown if "STUDY" in text)
 
 
-def test_study_of_the_page_runs(tmp_path):
+@pytest.mark.parametrize("number", [1, pytest.param(2, marks=pytest.mark.nightly)])
+def test_the_example_study_in_the_guide_runs(tmp_path, number):
     text = of_the_page()
     (tmp_path / "speeds.py").write_text(text.replace("20, seed", "1, seed"), encoding="utf-8")
     study = read_study(tmp_path / "speeds.py")
-    ran = run_study(study, tmp_path / "x", lambda: processes(1))
+    ran = run_study(study, tmp_path / "x", lambda: processes(number))
     assert run(study, tmp_path / "x", Quick()).resumed == 3
     entries = study.summary(ran.rows)
     assert [(one["speed"], one["shaper"]) for one in entries] == [

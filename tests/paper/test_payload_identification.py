@@ -31,7 +31,7 @@ def found(mass, com, *, declared=2.0, seed=2, description=ROBOT):
     return asyncio.run(run())
 
 
-def test_mass_and_centre_are_found_for_any_declaration():
+def test_payload_is_identified_although_another_one_is_declared():
     mass, com = 0.6, (0.03, 0.0, 0.05)
     payload = found(mass, com)
     assert payload.payload.mass == pytest.approx(mass, abs=0.02)
@@ -41,7 +41,7 @@ def test_mass_and_centre_are_found_for_any_declaration():
     assert payload.declared.mass == 2.0
 
 
-def test_empty_flange_is_found():
+def test_an_empty_flange_is_identified_as_zero_payload():
     payload = found(0.0, (0.0, 0.0, 0.0))
     assert payload.payload.mass < 0.02
     assert payload.payload.com == (0.0, 0.0, 0.0)

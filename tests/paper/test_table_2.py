@@ -62,7 +62,7 @@ def test_shaper_follows_the_mode_during_a_motion(done):
 
 
 @pytest.mark.nightly
-def test_baselines_are_judged(done, with_baselines):
+def test_each_baseline_shaper_brings_the_arm_to_rest_with_its_expected_delay(done, with_baselines):
     methods = with_baselines["baselines"]["Q1-Q3"]
     assert set(methods) == {
         "unshaped", "shaped", "equal_duration_double_s", "zv_frozen_at_end", "fixed_mzv", "fixed_ei2", "fixed_ei3",
@@ -77,7 +77,14 @@ def test_baselines_are_judged(done, with_baselines):
 
 
 def test_page_has_the_origin_of_every_result(done):
-    text = page_of("paper", {**as_dict(done), "others": [as_dict(done)]})
+    mine = as_dict(done)
+    others = [row | {"here": "so much", "origin": "tuned"} for row in mine["origins"]]
+    text = page_of("paper", {**mine, "others": [{**mine, "robot": "another", "origins": others}]})
+    assert "| figure | paper | UR5e | origin | another | origin |" in text
+    for row in mine["origins"]:
+        own = " | ".join(row[key] for key in ("figure", "paper", "here", "origin"))
+        assert f"| {own} | so much | tuned |" in text
+    assert f"- `another` matches {len(others)} of {len(others)} figures" in text
     for word in ("fitted", "tuned", "predicted", "not matched"):
         assert f"| {word} |" in text
 
@@ -103,7 +110,7 @@ def test_each_result_is_judged_by_its_tolerance(done):
 
 
 @pytest.mark.nightly
-def test_arm_with_stiction_has_the_papers_tails(done):
+def test_stiction_leaves_the_slow_decay_that_the_paper_measured(done):
     """One run, so three of the 23 figures may be missed beside the three that the page names."""
     sticking = simulate(free_setup(robot="ur5e_stiction", seed=78), runs=1, seed=78)
     matched = [row for row in as_dict(sticking)["origins"] if row["origin"] != "not matched"]

@@ -1,5 +1,7 @@
 """Plants by name are what their names say, for the arm, for what it carries, and for any number of joints."""
 
+import pickle
+
 import msgspec
 import numpy as np
 import pytest
@@ -33,6 +35,19 @@ def test_every_plant_moves_and_differs_from_the_described_arm(ur5e, name):
         arm.push(np.array([40.0, 40.0, 0.0, 0.0, 0.0, 0.0]))
         felt.append(np.array([arm.step(command).q for _ in range(100)]))
     assert bool(np.abs(felt[0] - felt[1]).max() > 1e-7) == (name != "calibrated")
+
+
+@pytest.mark.parametrize("robot", ["ur5e", "ur5-light"])
+@pytest.mark.parametrize("plant", ["calibrated", "stribeck"])
+def test_an_arm_of_a_pickled_description_moves_bit_for_bit_alike(robot, plant):
+    made, moved = (load(robot), variant(plant)), []
+    for description, named in (made, pickle.loads(pickle.dumps(made))):  # noqa: S301  our own
+        arm = named.make(description, description.payload, 0)
+        command = hold(description, [0.3] * description.joints)
+        arm.reset(command, seed=1)
+        arm.push(np.array([40.0, 40.0, 0.0, 0.0, 0.0, 0.0]))
+        moved.append([arm.step(command).q for _ in range(20)])
+    np.testing.assert_array_equal(*moved)
 
 
 def test_plants_have_the_parameters_of_their_labels(ur5e):

@@ -24,7 +24,7 @@ def test_search_covers_an_arm_of_two_joints():
     sequences.Sequence(arm, 1).run()
 
 
-def test_equal_numbers_give_equal_cases():
+def test_a_search_case_is_reproducible_from_its_number():
     one, other = (stops.draw(UR5E, 3) for _ in range(2))
     assert repr(one) == repr(other)
     first, second = sequences.Sequence(UR5E, 5), sequences.Sequence(UR5E, 5)

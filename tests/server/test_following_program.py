@@ -437,7 +437,7 @@ def test_a_waiting_program_ends_on_request(number, waits):
     assert not robot.told
 
 
-def test_old_registers_start_no_motion():
+def test_set_points_left_in_registers_by_an_earlier_run_move_nothing():
     robot = Alone(before=packages(swings(600, 0.4), 400)[-1])
     robot.steps(1000)
     assert robot.state is r.ProgramState.WAITING

@@ -131,7 +131,7 @@ def test_a_run_with_an_own_plant_is_recorded_and_replayed(tmp_path, place):
         load_plant(real)
 
 
-def test_a_rehearsal_does_not_make_the_plant():
+def test_compiling_ahead_does_not_connect_to_a_user_plant():
     _rehearse(setup(plant=OwnPlant("real.py:Arm", "", lambda *_: pytest.fail("it was touched"))))
 
 
@@ -141,7 +141,7 @@ def test_a_replay_refuses_a_plant_that_was_not_served(tmp_path, place):
         replay_file(content, plant=load_plant(place))
 
 
-def test_ticks_of_an_arm_are_late_or_missed_by_their_distance():
+def test_long_gaps_between_ticks_of_an_arm_count_as_late_or_missed():
     followed, found, now = ExternalTicks(0.002, 5.0), [], 5.0
     for gap in (0.002, 0.0025, 0.0015, 0.0071):
         now += gap

@@ -44,7 +44,7 @@ def test_background_threads_do_not_inherit_the_tick_threads_processor():
     assert found == [os.sched_getaffinity(0)]
 
 
-def test_the_payload_student_loads_its_kernel_when_it_is_made(monkeypatch):
+def test_the_payload_estimator_loads_its_kernel_before_ticks_start(monkeypatch):
     compiled, called = arm.torques_of, []
     monkeypatch.setattr(arm, "torques_of", lambda *given: called.append(given) or compiled(*given))
     payload_learning.PayloadEstimator(load("ur5e"))

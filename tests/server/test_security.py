@@ -144,7 +144,7 @@ def test_a_router_lets_a_robot_publish_only_under_its_name_or_namespace():
 
 
 @pytest.mark.parametrize(("name", "role"), ROLES.items())
-def test_a_role_without_clients_has_no_subject(name, role):
+def test_access_rules_leave_out_a_role_without_clients(name, role):
     made = access_control(["ur5e"], {name: role})
     assert made["subjects"] == [{"id": role, "cert_common_names": [name]}]
     assert [policy["subjects"] for policy in made["policies"]] == [[role]]

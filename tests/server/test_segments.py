@@ -77,7 +77,7 @@ def test_a_recording_keeps_the_last_ticks_in_four_segments(ticks, path):
     last = (ticks - 1) // 25 + 1
     assert names(path.parent) == run_names(path, 1, range(max(last - 4, 1), last + 1))
     assert recorder.place == path.with_name("run-1-part*.mcap")
-    for named in (recorder.place, path.parent, path) if ticks == 10 else (path,):
+    for named in (recorder.place, path.parent, path) if ticks == KEEP + 1 else (path,):
         content = read(named)
         assert content.complete
         assert content.dropped == {"state": 0, "event": 0, "truth": 0, "io": 0, "journal": 0}

@@ -130,7 +130,7 @@ def test_watch_prints_an_object_per_line_until_control_c(realtime):
 
 
 @pytest.mark.parametrize(("what", "kept"), json.loads((HERE / "kept_keys.json").read_text("utf-8")).items())
-def test_published_json_keys_stay(what, kept):
+def test_json_output_keeps_its_documented_keys(what, kept):
     """Those of a published version: docs/reference/what-stays.md."""
     words = what.split()
     command, list_of_it = words[: 1 + (words[0] == "log")], words[1 + (words[0] == "log") :]

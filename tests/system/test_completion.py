@@ -26,6 +26,12 @@ CASES = {
     "tvist serve --robot ur5": {"ur5-light", "ur5e", "ur5e_stiction"},
 }
 """Typed lines with what completes their last word."""
+ASKED = {
+    "tvist serve --shaper zvd": {"zvd", "zvdd", "zvddd"},
+    "tvist move Q": {"Q1", "Q2", "Q3"},
+    "tvist study moves --shapers zvd": {"zvd", "zvdd", "zvddd"},
+}
+"""The same for values that the shell asks the program for."""
 OF_EACH_KIND = ("tvist log an", "tvist serve --no-f", "tvist run wav", "tvist serve --robot ur5")
 VALUES = [
     (offered.SHAPERS, "zvd", {"zvd", "zvdd", "zvddd"}),
@@ -81,6 +87,11 @@ def test_bash_completes_the_last_word(typed, folder):
     assert candidates("bash", folder, typed) == CASES[typed]
 
 
+@pytest.mark.parametrize("typed", ASKED)
+def test_bash_completes_values(typed, folder):
+    assert candidates("bash", folder, typed) == ASKED[typed]
+
+
 @pytest.mark.parametrize("typed", OF_EACH_KIND)
 def test_zsh_completes_the_last_word(typed, folder):
     assert candidates("zsh", folder, typed) == CASES[typed]
@@ -92,7 +103,9 @@ def test_fish_completes_the_last_word(typed, folder):
 
 
 @pytest.mark.parametrize(("annotation", "typed", "wanted"), VALUES)
-def test_a_value_is_completed(annotation, typed, wanted, folder, monkeypatch):
+def test_completion_offers_the_valid_values_of_each_kind_of_option(
+    annotation, typed, wanted, folder, monkeypatch
+):
     monkeypatch.chdir(folder)
     names = annotation.completer(SimpleNamespace(incomplete=typed))
     assert {name for name in names if name.startswith(typed)} == wanted

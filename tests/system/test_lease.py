@@ -48,3 +48,16 @@ def test_killed_client_with_a_liveliness_token_loses_control_at_once(client, liv
     assert live.info()["control"] is None
     with live.control("heir") as token:
         assert live.command("keep_alive", token=token) == {"type": "done"}
+
+
+def test_killed_client_without_a_liveliness_token_keeps_control_until_its_lease_expires(client, live):
+    process = client("move", "lease_s=1.0")
+    live.next("state", lambda state: state["target_qd"][0] > 0.1)
+    kill(process)
+    refused = live.command("take_control", client="heir")
+    assert (refused["type"], refused["code"]) == ("refused", "no_control")
+    lost = live.wait("event", lambda event: event["kind"] == "lease_lost")
+    stopped = live.wait("event", lambda event: event["kind"] == "motion_stopped")
+    assert stopped["tick"] == lost["tick"]
+    with live.control("heir"):
+        pass

@@ -43,15 +43,19 @@ def a_bridge(host=HOST, *options):
 
 @pytest.fixture(scope="module")
 def shared(arm):
+    """The bridge of the tests at the end, which keeps other bridges away."""
     with a_bridge(HOST, "--ur", "--ur-address", OTHER, "--shaper", "zv") as served:
         yield served
 
 
 @pytest.fixture
 def bridge(shared):
-    """The bridge of all tests, which holds the arm; on a busy machine it may have lost it before."""
+    """The shared bridge, which holds the arm; on a busy machine it may have lost it before."""
     with Robot.connect(shared.endpoint, "bridge") as robot, robot.control("me") as control:
-        hold(robot, control)
+        if robot.state().robot_mode == RobotMode.RUNNING:
+            hold(robot, control)
+        else:
+            switch_on(robot, control)
     return shared
 
 
@@ -66,26 +70,36 @@ def sides(arm, bridge):
         yield there, robot, control
 
 
-def refusal(do):
-    """Return why something is refused; empty if it is not."""
+def refused(do, words):
+    """Return whether something is refused, with these words."""
+    why = ""
     try:
         do()
     except RefusedError as error:
-        return str(error)
-    return ""
+        why = str(error)
+    assert not why or words in why, why
+    return bool(why)
+
+
+def still(robot, control):
+    """Return a function that moves the arm to its present posture."""
+    return lambda: control.move_j(robot.state().target_q, velocity=0.3)
 
 
 def hold(robot, control):
-    """Wait until the bridge holds the arm: it accepts a move to the present posture."""
+    """Wait until the bridge holds the arm."""
+    eventually(lambda: not refused(still(robot, control), "not ready"))
 
-    def moves():
-        why = refusal(lambda: control.move_j(robot.state().target_q, velocity=0.3))
-        if "send power_on" in why:
-            why = refusal(control.power_on) or "not ready"
-        assert not why or "not ready" in why or "is not moved" in why, why
-        return not why
 
-    eventually(moves)
+def switch_on(robot, control):
+    """Power on as soon as the robot permits it; until then motions are refused."""
+
+    def switched():
+        assert refused(still(robot, control), "send power_on")
+        return not refused(control.power_on, "is not moved")
+
+    eventually(switched)
+    hold(robot, control)
 
 
 def beside(robot, change):
@@ -133,6 +147,59 @@ def protective_stop():
         connection.sendall(b"sec stopping():\n  protective_stop()\nend\n")
 
 
+def test_bad_start_options_are_refused_and_nothing_moves(arm):
+    motion = ("--plant", f"ur://{HOST}", "--enable-motion")
+    with Robot.connect(arm.endpoint) as there:
+        before = there.state().target_q
+        for options, words in (
+            (("--plant", f"ur://{NOBODY}", "--enable-motion"), ["no robot answers", "Next:"]),
+            ((*motion, "--robot", "ur10e"), ["is no UR10e"]),
+            ((*motion, "--payload", "2"), ["payload of 5 kg", "--payload"]),
+            ((*motion, "--tcp", "0,0,0.1,0,0,0"), ["tool centre point", "--tcp"]),
+            ((*motion, "--start", "Q2"), ["--start says"]),
+        ):
+            code, said = refused_to_start(*options)
+            assert code == 2, said
+            assert all(word in said for word in words), said
+        with there.control("somebody"):
+            code, said = refused_to_start(*motion)
+            assert (code, "local control, or another client" in said) == (2, True)
+        assert there.state().target_q == pytest.approx(before, abs=1e-4)
+
+
+def test_robot_brakes_when_the_bridge_is_killed(arm):
+    with a_bridge() as bridge:
+        with sides(arm, bridge) as (there, robot, control), states_of(there) as states:
+            control.move_j(beside(robot, 0.2), velocity=0.4, wait=False)
+            robot.advance(60)
+            bridge.process.kill()
+            eventually(lambda: states and speed(states[-1]) < 1e-4)
+        bridge.wait()
+    assert largest_step(states) < STEP
+
+
+def test_robot_brakes_when_the_link_fails_and_no_old_set_point_is_played(arm):
+    with contextlib.ExitStack() as links:
+        ports = [Relay(f"tcp/{HOST}:{port}", (NEAR, port)) for port in (DASHBOARD, PRIMARY, RTDE)]
+        for port in ports:
+            links.enter_context(port)
+        bridge = links.enter_context(a_bridge(NEAR))
+        there, robot, control = links.enter_context(sides(arm, bridge))
+        control.move_j(beside(robot, 0.2), velocity=0.4, wait=False)
+        robot.advance(30)
+        with states_of(there) as states:
+            for port in ports:
+                port.hold()
+            bridge.wait_until_said("it says nothing any more")
+            eventually(lambda: speed(there.state()) < 1e-3)
+            stands = there.state().target_q
+            for port in ports:
+                port.flow()
+            switch_on(robot, control)
+        assert largest_step(states) < STEP
+        assert there.state().target_q == pytest.approx(stands, abs=1e-3)
+
+
 def test_client_moves_the_robot_no_faster_than_the_speed_cap(arm, bridge):
     with sides(arm, bridge) as (there, robot, control):
         goal = beside(robot, 0.13)
@@ -151,14 +218,12 @@ def stopped(bridge, stop, words, *, mode):
     told = []  # stderr may omit some
     with Robot.connect(bridge.endpoint, "bridge") as robot, robot.control("me") as control:
         robot.on_event(lambda event: told.append(event.why or ""))
-        goal = beside(robot, 0.2)
-        control.move_j(goal, velocity=0.4, wait=False)
+        control.move_j(beside(robot, 0.2), velocity=0.4, wait=False)
         robot.advance(60)
         stop()
         eventually(lambda: any(words in why for why in told))
         eventually(lambda: robot.state().safety_mode == mode)
-        with pytest.raises(RefusedError):
-            control.move_j(goal)
+        assert refused(still(robot, control), "send unlock_protective_stop" if mode == 3 else "send power_on")
 
 
 def test_protective_stop_is_cleared_at_the_robot_first(arm, bridge):
@@ -168,7 +233,7 @@ def test_protective_stop_is_cleared_at_the_robot_first(arm, bridge):
             control.unlock_protective_stop()
         with states_of(there) as states:
             eventually(lambda: tell("unlock protective stop") == ["Protective stop releasing"])
-            eventually(lambda: not refusal(control.unlock_protective_stop))
+            eventually(lambda: not refused(control.unlock_protective_stop, "at the robot"))
             hold(robot, control)
             there.advance(20)
         assert largest_step(states) < STEP
@@ -182,7 +247,7 @@ def test_program_ended_at_the_robot_is_restarted_from_the_present_posture(arm, b
             control.power_on()
         tell("stop")
         with states_of(there) as states:
-            hold(robot, control)
+            switch_on(robot, control)
         assert largest_step(states) < STEP
 
 
@@ -199,18 +264,18 @@ def test_suspended_bridge_reports_missing_set_points_and_plays_no_old_ones(arm, 
     stopped(bridge, suspended, "no set-point reached it", mode=1)
     with sides(arm, bridge) as (there, robot, control):
         assert there.state().target_q == pytest.approx(stood, abs=1e-3)
-        hold(robot, control)
+        switch_on(robot, control)
 
 
 def test_arm_without_power_is_switched_on_at_the_robot_first(arm, bridge):
     stopped(bridge, lambda: tell("power off"), "its program was stopped at the robot", mode=1)
     with sides(arm, bridge) as (there, robot, control):
         eventually(lambda: there.state().robot_mode == RobotMode.POWER_OFF)
-        there.advance(100)
+        there.advance(40)
         with pytest.raises(RefusedError, match="switch it on and release its brakes at the robot"):
             control.power_on()
         tell("power on", "brake release")
-        hold(robot, control)
+        switch_on(robot, control)
         control.power_off()
     tvist("unlock", bridge.endpoint, "--name", "bridge", "--power-on").assert_done()
 
@@ -256,56 +321,3 @@ def test_commands_the_robot_cannot_follow_and_a_second_bridge_are_refused(arm, b
     code, said = refused_to_start("--plant", f"ur://{HOST}", "--enable-motion")
     assert (code, "another client holds its inputs" in said) == (2, True)
     bridge.assert_quiet()
-
-
-def test_robot_brakes_when_the_bridge_is_killed(arm, bridge):
-    """This ends the bridge of the tests above; those below start their own."""
-    with sides(arm, bridge) as (there, robot, control), states_of(there) as states:
-        control.move_j(beside(robot, 0.2), velocity=0.4, wait=False)
-        robot.advance(60)
-        bridge.process.kill()
-        eventually(lambda: states and speed(states[-1]) < 1e-4)
-    bridge.wait()
-    assert largest_step(states) < STEP
-
-
-def test_robot_brakes_when_the_link_fails_and_no_old_set_point_is_played(arm):
-    with contextlib.ExitStack() as links:
-        ports = [Relay(f"tcp/{HOST}:{port}", (NEAR, port)) for port in (DASHBOARD, PRIMARY, RTDE)]
-        for port in ports:
-            links.enter_context(port)
-        bridge = links.enter_context(a_bridge(NEAR))
-        there, robot, control = links.enter_context(sides(arm, bridge))
-        control.move_j(beside(robot, 0.2), velocity=0.4, wait=False)
-        robot.advance(60)
-        with states_of(there) as states:
-            for port in ports:
-                port.hold()
-            bridge.wait_until_said("it says nothing any more")
-            eventually(lambda: speed(there.state()) < 1e-3)
-            stands = there.state().target_q
-            for port in ports:
-                port.flow()
-            hold(robot, control)
-        assert largest_step(states) < STEP
-        assert there.state().target_q == pytest.approx(stands, abs=1e-3)
-
-
-def test_bad_start_options_are_refused_and_nothing_moves(arm):
-    motion = ("--plant", f"ur://{HOST}", "--enable-motion")
-    with Robot.connect(arm.endpoint) as there:
-        before = there.state().target_q
-        for options, words in (
-            (("--plant", f"ur://{NOBODY}", "--enable-motion"), ["no robot answers", "Next:"]),
-            ((*motion, "--robot", "ur10e"), ["is no UR10e"]),
-            ((*motion, "--payload", "2"), ["payload of 5 kg", "--payload"]),
-            ((*motion, "--tcp", "0,0,0.1,0,0,0"), ["tool centre point", "--tcp"]),
-            ((*motion, "--start", "Q2"), ["--start says"]),
-        ):
-            code, said = refused_to_start(*options)
-            assert code == 2, said
-            assert all(word in said for word in words), said
-        with there.control("somebody"):
-            code, said = refused_to_start(*motion)
-            assert (code, "local control, or another client" in said) == (2, True)
-        assert there.state().target_q == pytest.approx(before, abs=1e-4)

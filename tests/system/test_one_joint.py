@@ -61,7 +61,7 @@ def test_one_joint_arm_is_identified(done, tmp_path):
     assert calibration.provenance.arm == fingerprint(load("one-joint"))
 
 
-def test_lesson_of_the_page_exists(done, monkeypatch):
+def test_command_lesson_prints_the_path_of_its_page(done, monkeypatch):
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     assert "try.html: open it in any browser" in done("lesson").replace("\n", "")

@@ -128,6 +128,15 @@ class TestOperator:
             operator.next("state", lambda state: state["setpoint_sequence"] == 0)
             operator.command("servo_stop", token=token)
 
+    def test_loses_control_when_its_liveliness_token_goes(self, session, operator):
+        other = session("otto")
+        other.announce("otto")
+        assert other.command("take_control", client="otto")["type"] == "accepted"
+        before = len(operator.received["event"])
+        other.session.close()
+        lost = operator.wait("event", lambda event: event["kind"] == "lease_lost", since=before)
+        assert "otto" in lost["why"]
+
 
 class TestViewer:
     def test_receives_all_topics(self, viewer, operator):

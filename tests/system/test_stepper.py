@@ -50,7 +50,7 @@ def test_stop_of_another_client_and_a_signal_take_effect_within_a_long_step(tmp_
     assert 1 < told[-1][0] <= stopped["tick"] <= content.states[-1].tick < LONG
 
 
-def test_taking_the_clock_ends_a_step_of_the_client_in_control(lockstep):
+def test_a_running_step_ends_when_another_client_takes_the_clock(lockstep):
     with Wire(lockstep.endpoint) as mover, Wire(lockstep.endpoint) as stepper:
         mover.listen("state")
         token = mover.take("control", "mover")

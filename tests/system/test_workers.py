@@ -8,6 +8,7 @@ import pytest
 from tests.conformance.served import PATIENCE, Served, refused_to_start
 from tests.conformance.wire import Q1, Wire
 from tests.places import free_port, own_address
+from tests.system.routed import Router
 from tests.system.waiting import eventually
 
 from tvist_client.check import check
@@ -114,6 +115,11 @@ def test_port_in_use_is_refused_and_leaves_no_recordings(served, tmp_path):
     assert code == 1
     assert f"cannot listen on {address} port" in said
     assert list(tmp_path.iterdir()) == []
+
+
+def test_robots_of_all_processes_are_found_behind_a_router_in_a_namespace():
+    with Router() as router, Served(*LOCKSTEP, "--namespace", "hall-3", router=router.endpoint, name=None):
+        assert check(router.endpoint, NAMES[0], namespace="hall-3").robots == NAMES
 
 
 def test_metrics_of_all_processes_are_on_one_page():

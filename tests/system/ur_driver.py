@@ -4,6 +4,8 @@
 """
 
 import math
+import os
+import signal
 import socket
 import struct
 import sys
@@ -70,6 +72,7 @@ def jump(stream):
 
 FAULTS = {
     "cut": cut,
+    "frozen": lambda _: os.kill(os.getpid(), signal.SIGSTOP),
     "torn": lambda stream: (stream.sendall(b"\1\2\3\4\5"), time.sleep(1.0)),
     "absurd": lambda stream: (stream.sendall(struct.pack(">6i", *[2**31 - 1] * 6)), time.sleep(0.5)),
     "jumping": jump,

@@ -70,7 +70,7 @@ def test_robot_starts_at_rest_with_its_own_log_and_recording(tvist_robot):
 
 
 class TestTime:
-    def test_advances_while_a_call_waits_without_control(self, tvist_robot):
+    def test_simulated_time_passes_while_a_call_waits(self, tvist_robot):
         assert tvist_robot.advance(10) == 10
         assert tvist_robot.rest().tick > 10
 

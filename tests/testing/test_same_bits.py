@@ -32,7 +32,7 @@ class TestInAnyOrder:
         "run",
         [*range(OFTEN), *(pytest.param(run, marks=pytest.mark.nightly) for run in range(OFTEN, SOMETIMES))],
     )
-    def test_equal_motions_are_equal_bit_for_bit(self, tvist_robot, seen, run):  # noqa: ARG002  each run
+    def test_the_robot_fixture_repeats_a_motion_bit_for_bit(self, tvist_robot, seen, run):  # noqa: ARG002  each run
         seen.add(bits(tvist_robot))
         assert len(seen) == 1
 

@@ -46,7 +46,7 @@ def script_of(case):
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_the_language_by_example(case):
+def test_each_example_script_has_its_expected_result(case):
     assert set(case) <= KNOWN
     dry, error, ticks = DryFunctions(), None, None
     try:

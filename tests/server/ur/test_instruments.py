@@ -75,7 +75,7 @@ def shaped(ur5e, io_changes=None):
     return snapshot
 
 
-def test_the_target_is_unshaped_and_the_shaped_one_has_its_own_names(ur5e):
+def test_ur_targets_are_unshaped_and_shaped_values_have_separate_names(ur5e):
     snapshot = shaped(ur5e)
     for name in FOLLOWED:
         assert getattr(snapshot, name.replace("target", "shaped")) == getattr(snapshot.state, name)
