@@ -460,7 +460,7 @@ def test_commands_that_would_not_reach_the_robot_are_refused(robot):
         (
             c.SetPayload,
             {"mass": 1.0, "com": (0.0, 0.0, 0.0), "inertia": (0.0,) * 6},
-            "change it there first",
+            "set it there first",
         ),
         (c.SetShaper, {"name": "elastic"}, "takes positions only"),
     ):

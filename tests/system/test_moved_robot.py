@@ -154,7 +154,7 @@ def test_bad_start_options_are_refused_and_nothing_moves(arm):
         for options, words in (
             (("--plant", f"ur://{NOBODY}", "--enable-motion"), ["no robot answers", "Next:"]),
             ((*motion, "--robot", "ur10e"), ["is no UR10e"]),
-            ((*motion, "--payload", "2"), ["payload of 5 kg", "--payload"]),
+            ((*motion, "--payload", "2"), ["payload is set to 5 kg", "--payload"]),
             ((*motion, "--tcp", "0,0,0.1,0,0,0"), ["tool centre point", "--tcp"]),
             ((*motion, "--start", "Q2"), ["--start says"]),
         ):
@@ -314,7 +314,7 @@ def test_commands_the_robot_cannot_follow_and_a_second_bridge_are_refused(arm, b
         for command, words in (
             (lambda: control.set_shaper("elastic"), "takes positions only"),
             (lambda: control.set_digital_output(0, True), "only set-points are sent"),
-            (lambda: control.set_payload(1.0, (0.0, 0.0, 0.0), (0.0,) * 6), "change it there first"),
+            (lambda: control.set_payload(1.0, (0.0, 0.0, 0.0), (0.0,) * 6), "set it there first"),
         ):
             with pytest.raises(RefusedError, match=words):
                 command()
