@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+import msgspec
 import numpy as np
 import pinocchio as pin
 
@@ -19,12 +20,13 @@ from tvist_plant.drives import (
     springs_and_dampers,
     static_twist,
 )
-from tvist_plant.imperfections import STICTION, Imperfections, combined, imperfect_model
+from tvist_plant.imperfections import STICTION, Imperfections, imperfect_model
 from tvist_plant.integrator import rows
 from tvist_plant.model import FlexibleModel, Floats
 from tvist_plant.modes import Modes, modes
 from tvist_plant.outside import Outside
 from tvist_plant.plant import PERIOD, Measurement, PlantError, PlantTruth, Response, SimulatedArm
+from tvist_plant.robot_checks import in_words
 from tvist_plant.sensors import Accelerometer, gear_phases
 
 SUBSTEPS_OF_A_PERIOD = 4
@@ -33,6 +35,18 @@ mostly gear ripple; two agree within 0.09."""
 SUBSTEPS_IF_IMPERFECT = 8
 """Substeps with imperfections, which are integrated explicitly. Stiction alone needs only four: the flange's
 acceleration is then within 0.02 m/s² of that with 64."""
+
+
+def combined(description: RobotDescription, more: Imperfections | None) -> Imperfections:
+    """Return the robot file's imperfections, overridden by values of `more`; raise ValueError if one is invalid."""
+    if more is None:
+        return description.imperfections
+    content = msgspec.to_builtins(more.given())
+    try:
+        msgspec.convert(content, Imperfections)
+    except msgspec.ValidationError as error:
+        raise ValueError(in_words(error, content)) from None
+    return msgspec.structs.replace(description.imperfections, **more.given())
 
 
 class FlexibleArm(SimulatedArm):

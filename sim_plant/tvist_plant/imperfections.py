@@ -23,30 +23,16 @@ x and y axes and carries a ring with mass under the arm. A tilted arm leans in t
 knowledge; the truth is given in the upright world.
 """
 
-import msgspec
 import numpy as np
 import pinocchio as pin
 
 from tvist_plant.model import FLANGE, FlexibleModel, flexible_model
-from tvist_plant.robot_checks import in_words
 from tvist_plant.robot_tables import Imperfections, Payload, RobotDescription, YieldingBase
 
-__all__ = ["STICTION", "Imperfections", "YieldingBase", "combined", "imperfect_model", "on_base"]
+__all__ = ["STICTION", "Imperfections", "YieldingBase", "imperfect_model", "on_base"]
 
 STICTION = frozenset({"stiction", "stiction_load", "stiction_speed", "stiction_stiffness"})
 """Keys of the motors' stiction."""
-
-
-def combined(description: RobotDescription, more: Imperfections | None) -> Imperfections:
-    """Return the robot file's imperfections, overridden by values of `more`; raise ValueError if one is invalid."""
-    if more is None:
-        return description.imperfections
-    content = msgspec.to_builtins(more.given())
-    try:
-        msgspec.convert(content, Imperfections)
-    except msgspec.ValidationError as error:
-        raise ValueError(in_words(error, content)) from None
-    return msgspec.structs.replace(description.imperfections, **more.given())
 
 
 def imperfect_model(

@@ -9,8 +9,8 @@ from tvist_controller.api.line import respond
 from tvist_lab.metrics.ring_down import Ring
 from tvist_lab.study.line import RESTING, ControlLine
 from tvist_plant.description import DescriptionError, Payload, load
-from tvist_plant.flexible_arm import FlexibleArm
-from tvist_plant.imperfections import Imperfections, combined
+from tvist_plant.flexible_arm import FlexibleArm, combined
+from tvist_plant.imperfections import Imperfections
 
 ARM = load("ur5-light")
 SENSOR = Payload(mass=0.4, com=(0.0, 0.0, 0.04), inertia=(4e-4, 0.0, 0.0, 4e-4, 0.0, 4e-4))
