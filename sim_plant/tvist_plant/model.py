@@ -111,6 +111,11 @@ def flexible_model(
     )
 
 
+def holding_torque(model: pin.Model, q: Floats) -> Floats:
+    """Return the torques that hold an arm against gravity, shape (n,) [N m]."""
+    return np.asarray(pin.computeGeneralizedGravity(model, model.createData(), q))
+
+
 def carries_weight(description: RobotDescription) -> bool:
     """Return whether gravity can load any joint, which it cannot if all axes are vertical."""
     turns = [link_frame(description, number).rotation for number in range(description.joints - 1)]

@@ -27,7 +27,7 @@ from tvist_lab.recordings import Floats, Recording
 from tvist_lab.workspace import workspace
 from tvist_plant.description import Payload as Body
 from tvist_plant.description import RobotDescription
-from tvist_plant.model import carries_weight, rigid_model
+from tvist_plant.model import carries_weight, holding_torque, rigid_model
 from tvist_protocol.values import Payload
 
 POSES = 6
@@ -165,8 +165,9 @@ class _Regressor:
         """
         weight = np.tile(1.0 / self._friction, len(poses))
         solved = np.linalg.pinv(rows * weight[:, None])
+        bare = np.concatenate([holding_torque(self._bare, q) for q in poses])
         moved = [
-            solved @ (weight * np.concatenate([_torque(model, q) - _torque(self._bare, q) for q in poses]))
+            solved @ (weight * (np.concatenate([holding_torque(model, q) for q in poses]) - bare))
             for model in self._heavier
         ]
         return np.asarray(np.sqrt(np.sum(np.square(moved), axis=0)))
@@ -203,11 +204,6 @@ def _least_squares(matrix: Floats, right: Floats) -> tuple[Floats, Floats]:
     freedom = max(len(right) - matrix.shape[1], 1)
     variance = max(float(np.sum((right - matrix @ found) ** 2)) / freedom, LEAST_ERROR**2)
     return np.asarray(found), np.asarray(np.sqrt(np.diag(np.linalg.pinv(matrix.T @ matrix)) * variance))
-
-
-def _torque(model: pin.Model, q: Floats) -> Floats:
-    """Return the torques that hold an arm, shape (n,) [N m]."""
-    return np.array(pin.computeGeneralizedGravity(model, model.createData(), q))
 
 
 def _free(description: RobotDescription, declared: Payload, seed: int) -> list[Floats]:

@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import cache, partial
 
 import numpy as np
-import pinocchio as pin
 
 from tvist_lab.metrics.change_detector import SHOWN, ChangeDetector, DetectedChange
 from tvist_lab.metrics.motion import MotionRows
@@ -14,7 +13,7 @@ from tvist_lab.metrics.ring_listener import RingListener
 from tvist_lab.metrics.table import MeasuredRecording, MotionResult
 from tvist_lab.recordings import Floats, Recording
 from tvist_plant.description import Payload, RobotDescription, load, robots
-from tvist_plant.model import carries_weight, rigid_model
+from tvist_plant.model import carries_weight, holding_torque, rigid_model
 from tvist_plant.plant import PERIOD
 
 NEEDED = ("target_q", "actual_q", "actual_moment", "target_moment", "actual_tool_accelerometer")
@@ -144,16 +143,12 @@ class FitMonitor:
 
     def _felt(self, q: Floats, feedback: Floats) -> tuple[float, float]:
         """Return the mass that explains the drives' feedback at rest, and its bound from friction [kg]."""
-        per_kg = _weight(self._loaded, q) - _weight(self._arm, q)
+        per_kg = holding_torque(self._loaded, q) - holding_torque(self._arm, q)
         weighted = per_kg / self._unsure**2
         square = float(weighted @ per_kg)
         if square <= 0.0:
             return 0.0, math.inf
         return float(weighted @ feedback) / square, UNKNOWN * float(np.abs(weighted) @ self._unsure) / square
-
-
-def _weight(model: pin.Model, q: Floats) -> Floats:
-    return np.asarray(pin.computeGeneralizedGravity(model, model.createData(), q))
 
 
 def _told(change: DetectedChange | None, why: Callable[[DetectedChange], str]) -> list[str]:
