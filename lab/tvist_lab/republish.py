@@ -29,7 +29,7 @@ REFUSAL = Refused(
 )  # answer to every command
 
 
-class PlaybackDesk(CommandIntake):
+class PlaybackIntake(CommandIntake):
     """Describes the recorded robot and refuses everything else."""
 
     def __init__(self, info: Info, name: str) -> None:
@@ -73,11 +73,13 @@ class Playback:
         self.states = 0
         self._content, self._speed, self._loop = content, speed, loop
         endpoints, guard = server_security(listen, [self.name], security=security, insecure=insecure)
-        self._desk = PlaybackDesk(content.info, self.name)
+        self._intake = PlaybackIntake(content.info, self.name)
         self._network = Network(endpoints, guard, lockstep=False)
         try:
             truth = content.counts["truth"] > 0
-            self._gateway: Gateway = self._network.gateway(self.name, self._desk, lockstep=False, truth=truth)
+            self._gateway: Gateway = self._network.gateway(
+                self.name, self._intake, lockstep=False, truth=truth
+            )
         except BaseException:
             self._network.close()
             raise
@@ -97,7 +99,7 @@ class Playback:
                     elif self.states % 50 == 0:
                         await asyncio.sleep(0)  # it is late, but has to notice that it is cancelled
                     self.states += 1
-                    self._desk.tick = message.tick
+                    self._intake.tick = message.tick
                 self._gateway.publish(topic_of(message), message, encode(message))
         finally:
             # In a thread, since a client that has stopped reading may delay this for ten seconds.

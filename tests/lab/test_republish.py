@@ -11,7 +11,7 @@ from tvist_cli.failure import Failure
 from tvist_lab import republish
 from tvist_lab.recordings import RecordingError
 from tvist_lab.recordings.mcap_file import read
-from tvist_lab.republish import Playback, PlaybackDesk, played
+from tvist_lab.republish import Playback, PlaybackIntake, played
 from tvist_protocol import Event, Info, State
 from tvist_protocol.codec import decode, encode
 from tvist_protocol.commands import TakeControl
@@ -100,7 +100,7 @@ def test_info_has_the_name_and_the_present_tick(path, network):
 
 @pytest.mark.parametrize("data", [encode(TakeControl(client="a")), b"nonsense"])
 def test_playback_refuses_commands(data):
-    desk, answers = PlaybackDesk(INFO, "ghost"), []
+    desk, answers = PlaybackIntake(INFO, "ghost"), []
     desk.request(data, answers.append)
     (refused,) = answers
     assert isinstance(refused, Refused)
