@@ -21,7 +21,28 @@ from tvist_urscript.signatures import (
 from tvist_urscript.values import LONGEST, Array, Pose, Struct, Value, to_str
 
 __all__ = [
-    "EVALUATIONS", "LONGEST", "METHOD", "PURE", "REQUIRED", "Array", "Fault", "Machine", "Parameter", "Pose",
-    "Script", "ScriptError", "Signature", "Signatures", "Struct", "Value", "check", "compile_script", "costs",
-    "names", "parameters", "signature", "signatures", "to_str",
-]  # fmt: skip
+    "EVALUATIONS",
+    "LONGEST",
+    "METHOD",
+    "PURE",
+    "REQUIRED",
+    "Array",
+    "Fault",
+    "Machine",
+    "Parameter",
+    "Pose",
+    "Script",
+    "ScriptError",
+    "Signature",
+    "Signatures",
+    "Struct",
+    "Value",
+    "check",
+    "compile_script",
+    "costs",
+    "names",
+    "parameters",
+    "signature",
+    "signatures",
+    "to_str",
+]
