@@ -132,6 +132,7 @@ def _tag(fault: _Fault) -> ProtocolError:
 
 
 def _kind(fault: _Fault, wanted: str, got: str) -> ProtocolError:
+    # A boolean or bytes would be shown as another value than the sender wrote.
     if isinstance(fault.value, str | int | float) and got not in {"bool", "bytes"}:
         why = f"{fault.whole} is {quoted(fault.value)}: must be {_kinds(wanted)}"
     else:

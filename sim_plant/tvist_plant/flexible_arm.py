@@ -41,12 +41,13 @@ def combined(description: RobotDescription, more: Imperfections | None) -> Imper
     """Return the robot file's imperfections, overridden by values of `more`; raise ValueError if one is invalid."""
     if more is None:
         return description.imperfections
-    content = msgspec.to_builtins(more.given())
+    given = more.given()
+    content = msgspec.to_builtins(given)
     try:
         msgspec.convert(content, Imperfections)
     except msgspec.ValidationError as error:
         raise ValueError(in_words(error, content)) from None
-    return msgspec.structs.replace(description.imperfections, **more.given())
+    return msgspec.structs.replace(description.imperfections, **given)
 
 
 class FlexibleArm(SimulatedArm):

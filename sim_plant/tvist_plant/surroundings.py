@@ -1,4 +1,4 @@
-"""What is around an arm: the objects of a scene, and the fingers of a gripper."""
+"""Objects of a scene around an arm, and the fingers of its gripper."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

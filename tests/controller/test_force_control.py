@@ -70,7 +70,7 @@ def test_zeroing_subtracts_an_offset_in_the_sensor_frame():
 
 
 def test_in_free_air_the_tool_moves_along_the_wanted_force_only():
-    """As in ROS 2's test: +10 N, damping 0.1, gain 0.8; over 3 cm in 5 s, other axes below 1 mm."""
+    """With the values of ROS 2's test, 10 N moves the tool by over 3 cm in 5 s, and other axes by less than 1 mm."""
     robot, _ = touching(0.0)
     assert force_mode(robot, wrench=(0.0, 0.0, 10.0, 0.0, 0.0, 0.0), damping=0.1, gain=0.8) == Accepted(id=1)
     begun = np.array(robot.tick(1).actual_TCP_pose)
@@ -241,7 +241,7 @@ def test_arcs_in_force_mode_and_moves_in_freedrive_are_refused():
 
 @pytest.mark.parametrize(("stiffness", "sensor"), [(1e5, True), (1e4, False), (0.0, False)])
 def test_tool_contact_finds_the_start_of_a_contact(stiffness, sensor):
-    """As scripts of UR's clients do: move until tool_contact reports one, then back to its start."""
+    """The program moves until it feels a contact, then back to where that began, as programs of UR robots do."""
     robot, plant = touching(stiffness, gap=0.02, sensor=sensor)
     finished(
         robot, plant, "s = 0", "i = 0", "while s == 0 and i < 800:", "s = tool_contact([0, 0, -1, 0, 0, 0])",

@@ -215,7 +215,7 @@ def test_payload_inertia_is_not_taken_for_a_force():
 
 
 def test_late_set_points_are_not_taken_for_a_contact():
-    """As over a network: four times a second twelve ticks bring none, and the next one catches up."""
+    """Set-points pause for twelve ticks four times a second, as on a network, and the next tick catches up."""
     robot, _ = touching(0.0, mass=3.0)
     start(robot, "thread watch():", "s = 0", "while True:", "s = s + tool_contact(get_actual_tcp_speed())",
           "write_output_integer_register(0, s)", "sync()", "end", "end", "t = run watch()",

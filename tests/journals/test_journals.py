@@ -75,7 +75,7 @@ def test_recorded_runs_are_reproduced(name):
 
 @pytest.mark.nightly
 def test_replay_is_equal_with_kernels_compiled_for_any_processor(tmp_path):
-    """As in the wheels of `tvist-compiled`; everything that is not compiled is the same."""
+    """The wheels of `tvist-compiled` contain such kernels; all other code is the same."""
     any_processor = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "", "NUMBA_CACHE_DIR": str(tmp_path)}
     run = [sys.executable, "-c", DIGEST, *map(str, RUNS)]
     here, there = (

@@ -263,7 +263,9 @@ def test_link_pipe_or_damaged_file_is_not_loaded(kernel, change):
     cache, file, mark = kernel
     change(file)
     if change is linked:
-        assert not held([cache])  # a warning would be an error: nobody is told to change its mode
+        assert not held(
+            [cache]
+        )  # without a warning, which would fail the test, since no change of its mode would help
     load(cache)
     assert not mark.exists()
 

@@ -18,7 +18,7 @@ class RtdeLink(Relay):
         self.sent, self.passed = [], []
         """Kinds of the reader's packages, and for each connection the timestamps of the rows that passed."""
         self.slow, self.lost, self.repeated = False, 0.0, 0.0
-        """Whether the robot sends at 125 Hz, and the shares of rows that are dropped and repeated."""
+        """Options of the link: rows at 125 Hz instead of 500 Hz, and shares of rows to drop and to repeat."""
         super().__init__(target)
 
     def takes(self):

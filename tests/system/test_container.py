@@ -141,7 +141,7 @@ def test_nothing_is_compiled_on_a_processor_of_another_name(engine, options, com
 
 
 def test_robot_with_mounted_keys_answers_clients_with_a_key_only(engine, tmp_path):
-    """As in docker/README.md, the health check is a viewer, and the authority's key stays outside."""
+    """The health check has a viewer's key, and the authority's key stays outside, as docker/README.md advises."""
     keys = tmp_path / "keys"
     host = ("--robot", "ur5e", "--host", "127.0.0.1")
     engine.run(sys.executable, "-m", "tvist_cli", "keys", keys, *host, "--viewer", "health")

@@ -67,7 +67,7 @@ def temporary(tmp_path, monkeypatch):
     ],
 )
 def test_signal_ends_all_processes_of_a_study(number, to, temporary, tmp_path):
-    """That the next start continues the study: lab/test_sweep.py."""
+    """tests/lab/test_sweep.py tests that the next start continues the study."""
     (tmp_path / "spec.toml").write_text(SPEC)
     words = [sys.executable, "-m", "tvist_cli", "study", "spec.toml", "--output", "out"]
     pipes = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "text": True}

@@ -214,7 +214,7 @@ class InverseDynamics(Arm):
 
     @property
     def changing(self) -> bool:
-        """Whether a new payload is being phased in."""
+        """True while the torque changes from the previous payload to the new one."""
         return self._ticks_left > 0
 
     @property

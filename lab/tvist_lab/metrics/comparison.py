@@ -135,7 +135,7 @@ def ends_of(recording: Recording, motion: MotionRows, column: str = "") -> Float
 
 
 def same_ends(first: Floats, second: Floats) -> bool:
-    """Whether two motions have the same ends, within 0.02 rad."""
+    """Return whether two motions start and end at the same postures, within 0.02 rad."""
     return first.shape == second.shape and bool(np.max(np.abs(first - second)) <= SAME)
 
 
