@@ -2,6 +2,8 @@
 
 import argparse
 import asyncio
+import contextlib
+import os
 import signal
 
 import pytest
@@ -13,6 +15,7 @@ from tests.nightly import NightlyRecord
 from tests.skips import Skips
 
 settings.load_profile("full")
+NICE = os.nice(0)  # of this process at its start
 
 
 def _count(text):
@@ -72,6 +75,14 @@ def pytest_sessionstart(session):
         compile_kernels()
     if hasattr(session.config, "workerinput"):
         NURSERY.start()
+
+
+def pytest_runtest_setup(item):
+    """Give real-time tests, which one of several processes runs, priority over the tests of the others."""
+    if hasattr(item.config, "workerinput"):
+        nice = NICE if item.get_closest_marker("realtime") else NICE + 10
+        with contextlib.suppress(PermissionError):  # only root may lower the value again
+            os.setpriority(os.PRIO_PROCESS, 0, nice)
 
 
 def compile_kernels():

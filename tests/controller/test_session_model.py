@@ -504,7 +504,7 @@ FULL = pytest.mark.parametrize(
 def check(clock, full):
     few = 50 if clock == "realtime" else 25  # two clocks are stepped
     runs = settings(
-        max_examples=share(150 if full else few),
+        max_examples=share(100 if full else few),
         stateful_step_count=40 if full else 25,
         deadline=None,
         derandomize=not full,

@@ -9,7 +9,7 @@ from tvist_urscript.machine import OVERDRAFT
 from .dry_functions import DryFunctions
 from .programs import spoilt, valid
 
-CI, NIGHTLY = 25, 5_000
+CI, NIGHTLY = 25, 3_000
 BUDGET, TICKS = 300, 60
 # A statement, and what it may exceed the budget by when it works on lists.
 BEYOND = MOST_OPERATIONS + 2 * OVERDRAFT

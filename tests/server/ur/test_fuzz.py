@@ -223,7 +223,7 @@ def attack(house, interface, random, packages):
 
 
 @pytest.mark.parametrize(
-    "packages", [160, pytest.param(20_000, marks=[pytest.mark.nightly, pytest.mark.timeout(3600)])]
+    "packages", [160, pytest.param(10_000, marks=[pytest.mark.nightly, pytest.mark.timeout(3600)])]
 )
 @pytest.mark.parametrize("interface", INTERFACES)
 def test_random_bytes_break_no_interface_and_disturb_no_other_client(interface, packages):
