@@ -14,7 +14,7 @@ NAMES = ("moves", "bench", "robustness", "match")
 
 
 def _offered(names: str | Callable[[], Iterable[str]], *endings: str) -> Parameter:
-    """Offer names and files with these endings; the function `MODULE:NAME` is imported only when a shell asks."""
+    """Complete names and files with these endings; names given as `MODULE:FUNCTION` are imported only then."""
 
     def complete(context: "CompletionContext") -> list[str]:
         typed, ends = escape(context.incomplete), (*endings, "/") if any(endings) else endings

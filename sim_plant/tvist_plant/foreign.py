@@ -33,7 +33,7 @@ def arm_of(plant: Plant) -> Plant:
 
 
 def called(plant: Plant, joints: int | None, *, untold: bool = False) -> Plant:
-    """Return a wrapper that raises only `PlantError` (passes all if joints is None); `untold` hides the truth."""
+    """Return a wrapper that turns exceptions into `PlantError`, unless joints is None; `untold` hides the truth."""
     members: dict[str, Any] = {
         name: _method(name)
         for name in _METHODS

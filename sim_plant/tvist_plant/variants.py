@@ -165,7 +165,7 @@ def _unlike(description: RobotDescription, seed: int) -> RobotDescription:
 
 
 def _all_at_once(description: RobotDescription, seed: int) -> RobotDescription:
-    """Return an arm with scattered springs, and friction that changes sign within half the speed."""
+    """Return an arm with scattered springs, and friction that changes sign over half the speed range."""
     return _off(SCATTER, 61, _sharper(0.5, description, seed), seed, SPRINGS)
 
 

@@ -19,7 +19,7 @@ pytestmark = [pytest.mark.acceptance, pytest.mark.timeout(1800)]
 CALLS = Path(__file__).parent / "calls"
 TORQUE = "needs a controller of version 5.23, and this one reports 5.22"
 KNOWN = {
-    "getForwardKinematics": "without a tool the client sends none, so that what is left in the registers counts",
+    "getForwardKinematics": "without a tool the client sends none, so that old register values are used",
     "setExternalForceTorque": "the client sends four bytes too few",
     **dict.fromkeys(("getMassMatrix", "getJacobian", "getJacobianTimeDerivative", "directTorque",
                      "getCoriolisAndCentrifugalTorques", "getTargetJointAccelerations"), TORQUE),

@@ -35,7 +35,7 @@ def constraints(lock: str) -> str:
 
 
 def clean() -> dict[str, str]:
-    """Return this process's environment without variables that lead to a checkout or to existing kernels."""
+    """Return this process's environment without variables that name a checkout or a cache of compiled functions."""
     ours = {"PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV", "NUMBA_CACHE_DIR"}
     found = {name: value for name, value in os.environ.items() if name not in ours}
     return {**found, "PYTHONUNBUFFERED": "1"}

@@ -104,7 +104,7 @@ class Sink:
         """Take changed inputs, outputs and registers; they precede the state of their tick."""
 
     def raised(self, error: Exception) -> None:
-        """Take an exception of a plant, program function or tick for a log; the robot has handled it."""
+        """Log an exception of a plant, program function or tick, which the robot has handled."""
 
     def journal(self, entry: Entry, /) -> None:
         """Take an input of the controller, which precedes the tick of its number."""

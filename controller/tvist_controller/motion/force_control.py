@@ -116,7 +116,7 @@ class ExternalSensor:
 
 
 class ForceControl(Monitor):
-    """Starts and ends force mode, and monitors its limits; `timeouts` as in `ExternalSensor`."""
+    """Starts and ends force mode, and monitors its limits; without `timeouts`, no sensor counts as silent."""
 
     def __init__(self, guidance: Guidance, forces: ToolForces, *, timeouts: bool) -> None:
         self._guidance, self._forces = guidance, forces

@@ -59,7 +59,7 @@ class Branch:
 
 
 class Route(NamedTuple):
-    """A path divided into runs."""
+    """A path divided into runs, which end at rest."""
 
     runs: list[Run]
     skipped: list[str]  # message for each omitted blend
@@ -67,7 +67,7 @@ class Route(NamedTuple):
 
 
 def route_of(legs: Sequence[Leg], tracker: Tracker, start: Branch | None = None) -> Route:
-    """Divide a path into runs, from a leg's start or a point on it; raise WayError if impossible."""
+    """Divide a path at its stops into runs, from `start` or the first leg's start; raise WayError if impossible."""
     route, last = Route([Run()], [], []), len(legs) - 1
     meets = meetings(legs)
     here = start

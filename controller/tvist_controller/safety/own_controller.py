@@ -114,7 +114,7 @@ class Watching(RemoteStatus):
 
 
 class Supervision(RemoteStatus):
-    """Follows a robot moved through its own controller; motion and safety are those of this controller."""
+    """Follows an arm that is moved through its manufacturer's controller; `motion` and `safety` are tvist's."""
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""Users' Python files with a shaper or plant (FILE.py:NAME), never named by network clients or recordings."""
+"""Users' Python files with a shaper or plant (FILE.py:NAME); network clients and recordings cannot name one."""
 
 import hashlib
 import re

@@ -87,7 +87,7 @@ class Limiter:
     """Follows a position signal exactly while within limits; otherwise catches up time-optimally.
 
     Limits apply to first, second and third differences. A signal within limits passes unchanged to the last
-    bit, as does any motion that keeps them in continuous time, because differences are means of derivatives.
+    bit. So does a motion whose derivatives keep the limits, because differences are means of derivatives.
     A signal is too fast if its velocity would exceed the limit before its acceleration can return to zero,
     and too far if it could not stop in range.
 

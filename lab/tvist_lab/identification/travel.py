@@ -24,7 +24,10 @@ async def unless_collision(measuring: Awaitable[Result]) -> Result | None:
 
 
 async def reach(arm: Arm, q: Floats) -> Motion:
-    """Move to a configuration, if a straight line collides via the upright arm; else raise RefusedError `collision`."""
+    """Move to a configuration; if the straight line collides, via the upright arm.
+
+    Raises RefusedError with code `collision` if that way collides, too.
+    """
     if (there := await unless_collision(arm.move_j(q))) is not None:
         return there
     upright = np.zeros_like(q)
