@@ -1,18 +1,10 @@
 """Tools with arguments describe them."""
 
-import runpy
-import sys
-
 import pytest
+from tests.conformance.served import finished
 
 
-@pytest.mark.filterwarnings("ignore:Cyclopts application invoked without tokens")
 @pytest.mark.parametrize("tool", ["executed", "mutants", "stubs", "tables"])
-def test_help_of_each_tool_names_its_arguments(tool, monkeypatch, capsys):
-    name = f"tools.{tool}"
-    monkeypatch.setattr(sys, "argv", [name, "--help"])
-    monkeypatch.delitem(sys.modules, name, raising=False)
-    with pytest.raises(SystemExit) as ended:
-        runpy.run_module(name, run_name="__main__")
-    assert ended.value.code in (None, 0)
-    assert "Usage: " in capsys.readouterr().out
+def test_help_of_each_tool_names_its_arguments(tool):
+    ended = finished("-m", f"tools.{tool}", "--help")
+    assert (ended.returncode, "Usage: " in ended.stdout) == (0, True), ended.stderr

@@ -23,7 +23,6 @@ from .browser import browser
 SEVEN = "tests/plant/urdf/seven.urdf"
 ARMS = ("ur5e", SEVEN, "one-joint")
 """Arms of the page; the first one moves."""
-SMALL = {"width": 200, "height": 200}  # window: drawing takes a processor
 UR5E = load("ur5e")
 
 
@@ -38,30 +37,74 @@ def standing(moved, look):
     return [replace(state, actual_q=zeros, reference_q=zeros, target_qdd=zeros) for state in moved.states[:3]]
 
 
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"version": 2}, "version 2"),
+        ({"a": [0.1]}, "1 a, 2 d and 2 alpha"),
+        ({"a": [], "d": [], "alpha": []}, "no joints"),
+        ({"bending": [2]}, "link 2: must be 0 to 1"),
+        (
+            {"capsules": [Capsule(name="x", link=5, start=(0, 0, 0), end=(0, 0, 1), radius=0.1)]},
+            "link 5: must be -1 to 1",
+        ),
+    ],
+)
+def test_geometry_that_cannot_be_drawn_is_refused(changes, says):
+    with pytest.raises(GeometryError, match=says):
+        Look(Geometry(**{"a": [0.1, 0.2], "d": [0.0, 0.0], "alpha": [0.0, 0.0], **changes}), UR5E.payload)
+
+
+def test_deflections_of_another_arm_are_refused(moved):
+    look = look_of("one-joint")
+    with pytest.raises(GeometryError, match="6 deflections where the robot's geometry has 2"):
+        look.row(moved.states[0], moved.truths[0])
+
+
+def test_arm_without_truth_is_stiff_and_old_truth_has_no_static_part(moved):
+    look, state, truth = look_of("ur5e"), moved.states[100], moved.truths[100]
+    assert look.row(state, None) == [*state.actual_q, *state.reference_q, *[0.0] * 20]
+    old = look.row(state, replace(truth, static_gear_deflection=[], static_link_deflection=[]))
+    assert old[12:18] == [0.0] * 6
+    assert old[18:24] == truth.gear_deflection
+
+
+def test_bodies_of_a_world_are_nan_while_unknown(moved):
+    look, state, truth = look_of("ur5e"), moved.states[100], moved.truths[100]
+    there = Look(replace(look.geometry, world=World(name="table", bodies=["box"], shapes=[])), look.payload)
+    pose = [-0.4, 0.1, 0.2, 0.0, 0.0, 0.3]
+    assert there.row(state, replace(truth, body_poses=pose)) == [*look.row(state, truth), *pose]
+    for row in (there.row(state, None), there.row(state, truth)):
+        assert len(row) == len(look.row(state, truth)) + 6
+        assert np.isnan(row[-6:]).all()
+
+
 @pytest.fixture(scope="module")
 def chromium(moved):  # whose event loop playwright would not suffer beside its own
     with browser() as started:
         yield started
 
 
+def undrawn(chromium):
+    """Return a small page that draws only when a test asks for it: drawing takes a processor."""
+    page = chromium.new_page(viewport={"width": 200, "height": 200})
+    page.set_default_timeout(PATIENCE * 1000.0)
+    page.add_init_script("requestAnimationFrame = () => 0")
+    return page
+
+
 @pytest.fixture(scope="module")
 def tab(chromium, moved, tmp_path_factory):
-    """A paused page with all arms."""
-    tracks = []
-    for name in ARMS:
-        look = look_of(name)
-        first = name == ARMS[0]
-        states, truths = (moved.states, moved.truths) if first else (standing(moved, look), [])
-        tracks.append(Track(name, look, states, truths))
+    """A page with all arms at the start of their motions."""
+    first, *others = map(look_of, ARMS)
+    tracks = [Track("moves", first, moved.states, moved.truths)]
+    tracks += [Track("rests", look, standing(moved, look), []) for look in others]
     file = tmp_path_factory.mktemp("pages") / "arms.html"
     file.write_text(playback(tracks, "test", factor=100.0), encoding="utf-8")
-    tab = chromium.new_page(viewport=SMALL)
-    failed = []
+    tab, failed = undrawn(chromium), []
     tab.on("pageerror", lambda error: failed.append(str(error)))
-    tab.set_default_timeout(PATIENCE * 1000.0)
     tab.goto(file.as_uri())
-    tab.evaluate("tvist.toggle()")
-    tab.wait_for_function("tvist.shown !== undefined")
+    tab.evaluate("tvist.draw(0)")
     assert not failed
     return tab
 
@@ -159,27 +202,23 @@ def test_arms_fill_the_picture(tab):
         assert all(-1.05 < edge < 1.05 for key in "xy" for edge in seen[key])
 
 
-def test_meshes_of_a_urdf_replace_the_drawn_links(chromium, moved, tmp_path):
+def test_meshes_of_a_urdf_replace_the_drawn_links(chromium, moved):
     corners = [(0, 0, 0), (0.1, 0, 0), (0, 0.1, 0.3)]
     facet = struct.pack("<12fH", *(0, 0, 1), *(value for corner in corners for value in corner), 0)
-    for number in range(2):
-        (tmp_path / f"part{number}.stl").write_bytes(bytes(80) + struct.pack("<I", 1) + facet)
-    meshes = [
-        Mesh(link=link, file=str(tmp_path / f"part{number}.stl"), placement=(0.0, 0.0, 0.1, 0.0, 0.0, 0.0))
-        for number, link in enumerate((-1, 2))
-    ]
+    stl, placement = bytes(80) + struct.pack("<I", 1) + facet, (0.0, 0.0, 0.1, 0.0, 0.0, 0.0)
+    meshes = [Mesh(link=link, file="part.stl", placement=placement) for link in (-1, 2)]
     look = look_of("ur5e")
     look = Look(replace(look.geometry, meshes=meshes), look.payload)
     packed = Track("x", look, standing(moved, look), []).packed(0.0)
     packed["look"]["meshes"] = ["/mesh/0.stl", "/mesh/1.stl"]
-    files = {f"/mesh/{number}.stl": (tmp_path / f"part{number}.stl").read_bytes() for number in range(2)}
+    files = dict.fromkeys(packed["look"]["meshes"], stl)
     files["/"] = page({"kind": "playback", "title": "x", "factor": 1, "tracks": [packed]})
-    tab = chromium.new_page(viewport=SMALL)
-    tab.set_default_timeout(PATIENCE * 1000.0)
+    tab = undrawn(chromium)
     tab.route("**/*", lambda route: route.fulfill(body=files[urlsplit(route.request.url).path]))
     tab.goto("http://tvist.test/")
     tab.wait_for_function(
-        "tvist.tracks?.[0].robot.arm.frames.flatMap((f) => f.children).filter((c) => c.userData.mesh).length === 2"
+        "tvist.tracks?.[0].robot.arm.frames.flatMap((f) => f.children).filter((c) => c.userData.mesh).length === 2",
+        polling=20,
     )
     counted = tab.evaluate(
         "() => { const all = tvist.tracks[0].robot.arm.frames.flatMap((f) => f.children);"
@@ -188,45 +227,3 @@ def test_meshes_of_a_urdf_replace_the_drawn_links(chromium, moved, tmp_path):
     )
     tab.close()
     assert counted == {"meshes": 2, "others": 1}  # the payload stays
-
-
-@pytest.mark.parametrize(
-    ("changes", "says"),
-    [
-        ({"version": 2}, "version 2"),
-        ({"a": [0.1]}, "1 a, 2 d and 2 alpha"),
-        ({"a": [], "d": [], "alpha": []}, "no joints"),
-        ({"bending": [2]}, "link 2: must be 0 to 1"),
-        (
-            {"capsules": [Capsule(name="x", link=5, start=(0, 0, 0), end=(0, 0, 1), radius=0.1)]},
-            "link 5: must be -1 to 1",
-        ),
-    ],
-)
-def test_geometry_that_cannot_be_drawn_is_refused(changes, says):
-    with pytest.raises(GeometryError, match=says):
-        Look(Geometry(**{"a": [0.1, 0.2], "d": [0.0, 0.0], "alpha": [0.0, 0.0], **changes}), UR5E.payload)
-
-
-def test_deflections_of_another_arm_are_refused(moved):
-    look = look_of("one-joint")
-    with pytest.raises(GeometryError, match="6 deflections where the robot's geometry has 2"):
-        look.row(moved.states[0], moved.truths[0])
-
-
-def test_arm_without_truth_is_stiff_and_old_truth_has_no_static_part(moved):
-    look, state, truth = look_of("ur5e"), moved.states[100], moved.truths[100]
-    assert look.row(state, None) == [*state.actual_q, *state.reference_q, *[0.0] * 20]
-    old = look.row(state, replace(truth, static_gear_deflection=[], static_link_deflection=[]))
-    assert old[12:18] == [0.0] * 6
-    assert old[18:24] == truth.gear_deflection
-
-
-def test_bodies_of_a_world_are_nan_while_unknown(moved):
-    look, state, truth = look_of("ur5e"), moved.states[100], moved.truths[100]
-    there = Look(replace(look.geometry, world=World(name="table", bodies=["box"], shapes=[])), look.payload)
-    pose = [-0.4, 0.1, 0.2, 0.0, 0.0, 0.3]
-    assert there.row(state, replace(truth, body_poses=pose)) == [*look.row(state, truth), *pose]
-    for row in (there.row(state, None), there.row(state, truth)):
-        assert len(row) == len(look.row(state, truth)) + 6
-        assert np.isnan(row[-6:]).all()

@@ -29,11 +29,8 @@ def done(way, info, state, io=None):
     return [step[0] for step in way.steps(info, state, io)]
 
 
-def test_simulated_robot_has_no_checklist(info):
-    assert done(ObservedArm(), info, Seen()) == []
-
-
 def test_checklist_of_a_watched_robot(info):
+    assert done(ObservedArm(), info, Seen()) == []  # a simulated robot has none
     way, there = ObservedArm(), replace(info, watched="ur://robot")
     assert done(way, there, Seen(RobotMode.DISCONNECTED, SafetyMode.UNDEFINED)) == [False] * 5
     assert done(way, there, Seen(RobotMode.POWER_OFF)) == [True, *[False] * 4]
