@@ -17,16 +17,7 @@ KERNELS = str(own_folder())
 
 ABSENT = ("scipy", "matplotlib", "mujoco", "polars", "marimo", "distributed", "tvist_lab", "tvist_view")
 """Packages that the extra `testing` does not install."""
-HIDDEN = f"""
-import sys
-
-class Hidden:
-    def find_spec(self, name, path=None, target=None):
-        if name.partition(".")[0] in {ABSENT!r}:
-            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
-
-sys.meta_path.insert(0, Hidden())
-"""
+HIDDEN = f"import sys; sys.modules.update(dict.fromkeys({ABSENT!r}))"
 OUTCOMES = """
 import pytest
 from tvist_testing import assert_settles_within
