@@ -32,7 +32,7 @@ PARTS = (*COMPUTED, "start", *SERVED)
 HEADS = ("figure", "value", "unit", "reference", "value", "ratio", "95 %", "n")
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main(arguments: Sequence[str] | None = None) -> None:
     """Run the measurements that the arguments select, and print the results."""
     # Matrices here are small, so threads would only slow each other down.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -57,7 +57,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(msgspec.json.encode(result).decode())
     else:
         show(result)
-    return 0
 
 
 def measure(seconds: float, tell: Tell, only: Sequence[str]) -> dict[str, Any]:
@@ -94,6 +93,6 @@ def _row(one: dict[str, Any]) -> list[str]:
 if __name__ == "__main__":
     end_like_interrupted()
     try:
-        sys.exit(main())
+        main()
     except KeyboardInterrupt:
         sys.exit(130)

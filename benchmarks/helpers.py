@@ -96,7 +96,17 @@ def rtde_clients(address: str, port: str, count: str, recipes: str, bare: str = 
         else:
             _set_up(client, names)
         clients.append(client)
-    _read(clients)
+    selector = selectors.DefaultSelector()
+    selector.register(sys.stdin, selectors.EVENT_READ)
+    for client in clients:
+        selector.register(client, selectors.EVENT_READ, client)
+        assert client.recv(65536), "the connection was closed"
+    print("ready", flush=True)
+    while True:
+        for key, _ in selector.select():
+            if key.data is None:
+                return
+            assert key.data.recv(65536), "the connection was closed"
 
 
 def _set_up(client: socket.socket, names: list[str]) -> None:
@@ -111,21 +121,6 @@ def _set_up(client: socket.socket, names: list[str]) -> None:
         while kind not in answers:
             answers |= dict(reader.feed(client.recv(65536)))
         assert b"NOT_FOUND" not in answers[kind], f"a variable is not known: {answers[kind]!r}"
-
-
-def _read(clients: list[socket.socket]) -> None:
-    """Read until stdin ends; report ready when each client has received something."""
-    selector = selectors.DefaultSelector()
-    selector.register(sys.stdin, selectors.EVENT_READ)
-    for client in clients:
-        selector.register(client, selectors.EVENT_READ, client)
-        assert client.recv(65536), "the connection was closed"
-    print("ready", flush=True)
-    while True:
-        for key, _ in selector.select():
-            if key.data is None:
-                return
-            assert key.data.recv(65536), "the connection was closed"
 
 
 def bare_send(address: str, port: str) -> None:
@@ -171,8 +166,7 @@ def bare_tick(endpoint: str) -> None:
     gc.collect()
     gc.freeze()
     print("ready", flush=True)
-    for line in sys.stdin:
-        name, seconds = line.split()
+    for name, seconds in map(str.split, sys.stdin):
         print(_paced(parts[name], float(seconds)), flush=True)
     session.close()  # type: ignore[no-untyped-call]
 
@@ -200,8 +194,7 @@ def bare_thread() -> None:
         schedule = Schedule(1, PERIOD, time.monotonic())
         ticks, due, missed = round(float(line) / PERIOD), 0, 0
         while due < ticks:
-            wait = schedule.due - time.monotonic()
-            if wait > 0.0:
+            if (wait := schedule.due - time.monotonic()) > 0.0:
                 time.sleep(wait)
             late = schedule.begin(time.monotonic())[2]
             due += max(1, late)

@@ -39,13 +39,8 @@ def line(tell: Tell) -> dict[str, Figure]:
 def streams(tell: Tell) -> dict[str, Figure]:
     """Measure the line while it receives set-points."""
     tell("streams of set-points beside MuJoCo")
-    parts = {
-        f"stream_{rate}_hz": (
-            f"the line with zv and set-points at {rate} Hz",
-            moving.stream_tick(500 // rate),
-        )
-        for rate in (500, 125)
-    }
+    said = "the line with zv and set-points at {} Hz"
+    parts = {f"stream_{rate}_hz": (said.format(rate), moving.stream_tick(500 // rate)) for rate in (500, 125)}
     return _beside_mujoco(parts)[0]
 
 
@@ -64,12 +59,8 @@ def _beside_mujoco(parts: Mapping[str, tuple[str, Run]]) -> tuple[dict[str, Figu
 def _filter_tick() -> Run:
     tvist, references = moving.line_filter(free_setup(truth=False)), moving.motion()
 
-    def go() -> None:
-        for q in references:
-            tvist.filter(q)
-
     def run() -> float:
         tvist.reset(references[0])
-        return moving.us_per_tick(go)
+        return moving.us_per_tick(lambda: [tvist.filter(q) for q in references])
 
     return run

@@ -1,7 +1,4 @@
-"""Record which test executes which line: `python -m tools.executed FOLDER [ARGUMENT OF PYTEST ...]`.
-
-It needs `pip install pytest-cov`, runs tests in parallel, and includes the programs that they start.
-"""
+"""Record which test executes which line, also in programs that tests start, for `tools.mutants`."""
 
 import json
 import os
@@ -11,7 +8,11 @@ import sys
 from collections import Counter
 from functools import cache
 from importlib import import_module
+from itertools import accumulate
 from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter, run
 
 ROOT = Path(__file__).parents[1]
 AT_START = """
@@ -33,8 +34,16 @@ elif "PYTEST_CURRENT_TEST" in os.environ:
 """Code that a program of a test runs first, or after a fork; an environment variable names the test."""
 
 
-def cover(folder: Path, arguments: list[str]) -> None:
-    """Run tests, and store in a folder which lines they execute."""
+def cover(folder: Path, *arguments: Annotated[str, Parameter(allow_leading_hyphen=True)]) -> None:
+    """Run tests in parallel, and store in FOLDER which lines they execute.
+
+    Install pytest-cov first.
+
+    Args:
+        folder: Folder of the results.
+        arguments: Further arguments of pytest, such as a file of tests.
+    """
+    folder = folder.resolve()
     folder.mkdir(parents=True, exist_ok=True)
     data, rc = str(folder / "coverage"), str(folder / "rc")
     quiet = "disable_warnings = no-data-collected, module-not-imported"
@@ -71,14 +80,10 @@ def shortest(tests: set[str], together: float) -> list[str]:
         of_file = kept.get(file, {})
         return float(of_file.get(name, 0.1) / cases[function] if name else sum(of_file.values()))
 
-    chosen = []
-    for test in sorted(tests, key=lambda one: (seconds(one), one)):
-        together -= seconds(test)
-        if together < 0.0:
-            break
-        chosen.append(test)
-    return chosen
+    ordered = sorted((seconds(one), one) for one in tests)
+    until = accumulate(took for took, _ in ordered)
+    return [test for (_, test), end in zip(ordered, until, strict=True) if end <= together]
 
 
 if __name__ == "__main__":
-    cover(Path(sys.argv[1]).resolve(), sys.argv[2:])
+    run(cover)

@@ -168,12 +168,9 @@ def tails_figure() -> Figure:
 
 def main() -> None:
     """Write all figures."""
+    figures = {"elastic": elastic_figure, "mean_delay": mean_delay_figure, "tails": tails_figure}
     with house_style():
-        for name, draw in (
-            ("elastic", elastic_figure),
-            ("mean_delay", mean_delay_figure),
-            ("tails", tails_figure),
-        ):
+        for name, draw in figures.items():
             print(save(draw(), IMAGES / f"{name}.png"))
 
 

@@ -1,13 +1,8 @@
-"""Draw mutants of the product, and check whether its tests find them; all refers to the last commit.
+"""Draw mutants of the product, and check whether its tests find them, both at the last commit.
 
-A mutant changes one operator, constant or branch.
-
-    python -m tools.mutants draw LIST.json COUNT SEED           draw mutants, or replace those of LIST that are gone
-    python -m tools.mutants run LIST.json FOLDER [NUMBER ...]    run all or some, and write the outcomes into LIST
-
-FOLDER is the output of `tools.executed`. That records neither kernels nor uses of values computed at import.
-The tests of such a line are those that execute a line which mentions the kernel or the name, or else any line
-of the file.
+A mutant changes one operator, constant or branch. Before you run mutants, record with `tools.executed` which
+test executes which line. That records neither kernels nor uses of values computed at import: the tests of
+such a line are those that execute a line which mentions the kernel or the name, or else any line of the file.
 """
 
 import ast
@@ -16,7 +11,6 @@ import json
 import os
 import random
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -29,14 +23,14 @@ from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
+from cyclopts import App
+
 from tools.executed import ROOT, executed, shortest
 
 LIMIT, HANGS, COMPILING = 60.0, 20, 400.0
 """Time limits of a run of pytest, of one test in it, and of compiling the kernels beforehand [s]."""
 SAME = ("file", "owner", "text", "kind", "before", "after")
 """Fields by which a mutant is found again when its line has moved."""
-
-
 SOURCES = (
     "cli", "clients", "controller", "lab", "protocol", "shaping", "sim_plant", "testing", "tvist_server", "urscript",
     "view",
@@ -48,6 +42,7 @@ PAIRS = (
 """Operators that replace each other. `|` and `&` are left out, since they mostly occur in types."""
 OTHER = {new: old for old, new in map(str.split, PAIRS[:8])} | dict(map(str.split, PAIRS))
 Mutant = dict[str, Any]
+app = App(name="python -m tools.mutants", help=__doc__)
 
 
 def walk(node: ast.AST, owner: str, hidden: bool, span: tuple[int, int]) -> Iterator[tuple[ast.AST, Mutant]]:
@@ -83,21 +78,17 @@ def changes(node: ast.AST) -> Iterator[tuple[str, Any, str]]:
         if operator in OTHER:
             changed = getattr(ast, OTHER[operator])()
             other.op, other.ops = changed, [changed, *getattr(node, "ops", ())[1:]]
-            yield (
-                "operator",
-                node,
-                ast.unparse(other) if isinstance(node, ast.stmt) else f"({ast.unparse(other)})",
-            )
+            after = ast.unparse(other)
+            yield "operator", node, after if isinstance(node, ast.stmt) else f"({after})"
 
 
 @cache
 def product() -> tuple[list[Mutant], dict[str, list[Mutant]]]:
     """Return all mutants, and for each name the places that mention it."""
-    listed = subprocess.run(
-        ["git", "ls-files", *SOURCES], cwd=ROOT, capture_output=True, text=True, check=True
-    )
+    command = ["git", "ls-files", *(f"{source}/tvist_*.py" for source in SOURCES)]
+    listed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
     mutants, mentions = [], defaultdict(list)
-    for file in (one for one in listed.stdout.split() if re.search(r"/tvist_.*\.py$", one)):
+    for file in listed.stdout.split():
         text = (ROOT / file).read_bytes()
         lines = text.splitlines(keepends=True)
         starts = list(accumulate(map(len, lines), initial=0))
@@ -106,18 +97,17 @@ def product() -> tuple[list[Mutant], dict[str, list[Mutant]]]:
                 name = node.id if isinstance(node, ast.Name) else node.attr
                 mentions[name].append({"file": file, "line": node.lineno, **place})
             for kind, old, after in changes(node):
-                start, end = (
-                    starts[old.lineno - 1] + old.col_offset,
-                    starts[old.end_lineno - 1] + old.end_col_offset,
-                )
+                start = starts[old.lineno - 1] + old.col_offset
+                end = starts[old.end_lineno - 1] + old.end_col_offset
                 line, before = lines[old.lineno - 1].decode().strip(), text[start:end].decode()
                 where = {"file": file, "line": old.lineno, "column": old.col_offset, "text": line}
                 mutants.append({**where, "kind": kind, "before": before, "after": after, **place})
     return mutants, mentions
 
 
-def draw(path: Path, count: int, seed: int) -> list[Mutant]:
-    """Keep the mutants of a list whose line still exists, and draw the others."""
+@app.command
+def draw(path: Path, count: int, seed: int) -> None:
+    """Draw mutants into the file PATH; one that it already has stays if its line still exists."""
     listed = json.loads(path.read_text(encoding="utf-8")) if path.exists() else []
     mutants, chosen, drawn = product()[0], random.Random(seed + len(listed)), []  # noqa: S311
     for old in listed:
@@ -128,7 +118,12 @@ def draw(path: Path, count: int, seed: int) -> list[Mutant]:
         kind = chosen.choice(("operator", "constant", "branch"))
         new = chosen.choice([one for one in mutants if one["kind"] == kind])
         drawn += [new] if new not in drawn else []
-    return drawn
+    write(path, drawn)
+
+
+def write(path: Path, mutants: list[Mutant]) -> None:
+    """Write a list of mutants."""
+    path.write_text(json.dumps(mutants, indent=1, ensure_ascii=False), encoding="utf-8")
 
 
 def tests_of(mutant: Mutant, folder: Path) -> set[str]:
@@ -147,9 +142,6 @@ def tests_of(mutant: Mutant, folder: Path) -> set[str]:
 
 def ran(where: Path, tests: list[str]) -> tuple[int | None, str]:
     """Compile changed kernels, and run tests until one fails; return the result of `ended`."""
-    for kernel in (one for source in SOURCES for one in (ROOT / source).rglob("*.kernel")):
-        (where / kernel.relative_to(ROOT).parent).mkdir(exist_ok=True)
-        shutil.copy2(kernel, where / kernel.relative_to(ROOT))
     ended(where, COMPILING, "tvist_cli", "serve", "--compile", "2")
     listed = where.parent / "tests"
     listed.write_text("\n".join(tests), encoding="utf-8")
@@ -198,26 +190,26 @@ def judged(mutant: Mutant, where: Path, folder: Path) -> Mutant:
     return {"outcome": "no test"}
 
 
-def main(what: str, path: Path, *more: str) -> None:
-    """Draw mutants or run them."""
-    if what == "draw":
-        drawn = draw(path, *map(int, more))
-        path.write_text(json.dumps(drawn, indent=1, ensure_ascii=False), encoding="utf-8")
-        return
-    mutants, numbers = json.loads(path.read_text(encoding="utf-8")), [int(one) for one in more[1:]]
+@app.command(name="run")
+def run_all(path: Path, folder: Path, *numbers: int) -> None:
+    """Run mutants of the file PATH, all or some by number, and write the outcomes into it.
+
+    FOLDER is the output of `tools.executed`.
+    """
+    mutants = json.loads(path.read_text(encoding="utf-8"))
     with tempfile.TemporaryDirectory() as temporary:
         where = Path(temporary) / "copy"
         subprocess.run(["git", "worktree", "add", "--detach", where], cwd=ROOT, check=True)
         try:
             for number in numbers or range(len(mutants)):
                 one = mutants[number]
-                one |= judged(one, where, Path(more[0]).resolve())
+                one |= judged(one, where, folder.resolve())
                 told = (one[key] for key in ("outcome", "file", "line", "before", "after"))
                 print(number, *told, flush=True)
-                path.write_text(json.dumps(mutants, indent=1, ensure_ascii=False), encoding="utf-8")
+                write(path, mutants)
         finally:
             subprocess.run(["git", "worktree", "remove", "--force", where], cwd=ROOT, check=True)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], Path(sys.argv[2]), *sys.argv[3:])
+    app()

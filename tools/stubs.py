@@ -1,8 +1,4 @@
-"""`python -m tools.stubs [FOLDER]`: write stubs of methods that exist only at run time, for editors and type checkers.
-
-These are the client's commands and its blocking classes. With FOLDER, write a copy of the client that
-contains them with their docstrings, for the documentation site. Run it in a checkout.
-"""
+"""Stubs of the client's methods that exist only at run time, for editors and type checkers."""
 
 import inspect
 import re
@@ -14,6 +10,8 @@ from inspect import formatannotation
 from pathlib import Path
 from textwrap import fill, indent
 from types import ModuleType
+
+from cyclopts import run
 
 import tvist_client
 from tvist_client import blocking, commands
@@ -36,8 +34,17 @@ def generated() -> dict[Path, str]:
     return {PACKAGE / f"{module.__name__.rpartition('.')[2]}.pyi": _stub(module) for module in MODULES}
 
 
-def write_described(folder: Path) -> None:
-    """Write a copy of the package whose documentation can be extracted without running it."""
+def main(folder: Path | None = None) -> None:
+    """Write the stubs into this checkout.
+
+    Args:
+        folder: Instead write into this folder a copy of the client that contains the methods with
+            their docstrings, from which the documentation site is made.
+    """
+    if folder is None:
+        for path, text in generated().items():
+            path.write_text(text, encoding="utf-8")
+        return
     copy = folder / PACKAGE.name
     shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("*.pyi", "__pycache__"))
     for module in MODULES:
@@ -91,8 +98,4 @@ def _sorted(text: str) -> str:
 
 
 if __name__ == "__main__":
-    if sys.argv[1:]:
-        write_described(Path(sys.argv[1]))
-    else:
-        for path, text in generated().items():
-            path.write_text(text, encoding="utf-8")
+    run(main)

@@ -45,7 +45,6 @@ def _arm() -> dict[str, Any]:
         "coulomb_friction", "friction_width", "friction_feedforward", "friction_feedforward_width",
         "gear_error_amplitude", "gear_error_waves",
     )  # fmt: skip
-    limits = {"velocity": PAPER.velocity, "acceleration": PAPER.acceleration, "jerk": PAPER.jerk}
     return {
         "middle": shoulder.middle,
         "change": shoulder.change,
@@ -55,36 +54,29 @@ def _arm() -> dict[str, Any]:
         "gear_phase": gear_phases(2, 0).tolist(),
         "period": PERIOD,
         "substeps": SUBSTEPS_OF_A_PERIOD,
-        "limits": limits,
+        "limits": {"velocity": PAPER.velocity, "acceleration": PAPER.acceleration, "jerk": PAPER.jerk},
     }
 
 
 def _ur5e() -> dict[str, Any]:
     """Return the motion from Q1 to Q3, without a shaper and with ZV that follows the arm's frequency."""
     poses = load("ur5e").poses
-    tracks = []
+    tracks, left = [], []
     for name, label in (("none", "unshaped"), ("zv", "shaped")):
         info, run = asyncio.run(run_beside(name, [poses["Q1"], poses["Q3"]]))
         assert info.geometry is not None  # this version's server sends it
-        tracks.append(Track(label, Look(info.geometry, info.payload), run.states, run.truths))
+        track = Track(label, Look(info.geometry, info.payload), run.states, run.truths)
+        tracks.append(track)
+        moving = np.flatnonzero(track.signals.acceleration > MOVING)
+        rest = track.signals.alpha[moving[-1] + 5 :]  # from 10 ms after the shaped reference's stop
+        left.append(float(np.nan_to_num(rest).max(initial=0.0)))
     span = moves(tracks[0].signals)
     assert span is not None  # the arm has moved
     start, stop = span[0] - 0.1, span[1]
     packed = [track.packed(start) for track in tracks]
     for one in packed:
         one["samples"] = {name: one["samples"][name] for name in ("time", "alpha")}
-    return {
-        "tracks": packed,
-        "left": [_largest_after_stop(track) for track in tracks],
-        "stop": stop - start,
-    }
-
-
-def _largest_after_stop(track: Track) -> float:
-    """Return the largest acceleration of the tool after the stop of the shaped reference [m/s²]."""
-    signals = track.signals
-    moving = np.flatnonzero(signals.acceleration > MOVING)
-    return float(np.nan_to_num(signals.alpha[moving[-1] + 5 :]).max(initial=0.0))
+    return {"tracks": packed, "left": left, "stop": stop - start}
 
 
 def main() -> None:

@@ -73,20 +73,14 @@ def assert_residual_vibration_below(robot: "FixtureRobot", limit: float, *, wind
     __tracebackhide__ = True
     _check("limit", limit, least=0.0)
     _check("window", window, least=0.02)
-    rows = _at_rest(robot, window)
-    alpha = vibration(rows, window)
+    alpha = vibration(_at_rest(robot, window), window)
     value = max(amplitude for _, amplitude in alpha)
     if value <= limit:
         return value
-    thirds = [(third * window / 3, (third + 1) * window / 3) for third in range(3)]
-    peaks = [
-        (
-            f"{first:.2f} to {past:.2f} s",
-            figure(max(a for t, a in alpha if first <= t <= past + 1e-9)),
-            f"{limit:g}",
-        )
-        for first, past in thirds
-    ]
+    peaks = []
+    for first, past in ((third * window / 3, (third + 1) * window / 3) for third in range(3)):
+        peak = max(a for t, a in alpha if first <= t <= past + 1e-9)
+        peaks.append((f"{first:.2f} to {past:.2f} s", figure(peak), f"{limit:g}"))
     raise AssertionError(
         f"the residual vibration of {robot.name} is {value:.3g} m/s², above {limit:g} m/s²\n"
         + table(("after the stop", "largest |α| [m/s²]", "limit"), peaks)
@@ -120,7 +114,6 @@ def assert_within_limits(
     __tracebackhide__ = True
     own = robot.history.joint_limits
     assert own is not None
-    joints = len(own.velocity)
     rules = [
         ("speed [rad/s]", "qd", _each("speed", speed, own.velocity)),
         ("acceleration [rad/s²]", "qdd", _each("acceleration", acceleration, own.acceleration)),
@@ -132,8 +125,7 @@ def assert_within_limits(
     if not rows:
         raise AssertionError(f"no time has passed for {robot.name}, so there is nothing to check")
     beyond: list[tuple[str, str, str, str]] = []
-    for joint in range(joints):
-        low, high = own.position[joint]
+    for joint, (low, high) in enumerate(own.position):
         for row in (min(rows, key=lambda one: one.q[joint]), max(rows, key=lambda one: one.q[joint])):
             if not low <= row.q[joint] <= high:
                 bounds = f"{figure(low)} to {figure(high)}"
@@ -162,10 +154,9 @@ def _at_rest(robot: "FixtureRobot", seconds: float) -> "list[HistoryRow]":
         raise AssertionError(f"{robot.name} has not moved, so there is nothing to check")
     rows = history.since_rest()
     seen = rows[-1].time - rows[0].time if rows else 0.0
-    ticks = math.ceil((seconds - seen) / history.period - 1e-6)
-    if ticks > 0:
+    if (ticks := math.ceil((seconds - seen) / history.period - 1e-6)) > 0:
         robot.advance(ticks)
-        robot.settle_messages()
+        robot.info()  # answered after everything published before, such as the last tick's truth
     return history.since_rest()
 
 
@@ -197,11 +188,9 @@ def settling(rows: "Sequence[HistoryRow]", band: float) -> tuple[float, float]:
     stop, end = rows[0].time, rows[-1].time
     tail = [row.pose for row in rows if row.time > end - TAIL]
     attained = [math.fsum(pose[axis] for pose in tail) / len(tail) for axis in range(3)]
-    distances = [math.dist(row.pose[:3], attained) for row in rows]
-    outside = [row.time for row, distance in zip(rows, distances, strict=True) if distance > band]
-    last = outside[-1] if outside else stop
-    settled = last <= end - TAIL
-    return last - stop if settled else math.inf, max(distances)
+    distances = [(math.dist(row.pose[:3], attained), row.time) for row in rows]
+    last = max((time for distance, time in distances if distance > band), default=stop)
+    return last - stop if last <= end - TAIL else math.inf, max(distances)[0]
 
 
 def vibration(rows: "Sequence[HistoryRow]", until: float) -> list[tuple[float, float]]:
@@ -213,23 +202,16 @@ def vibration(rows: "Sequence[HistoryRow]", until: float) -> list[tuple[float, f
 
     stop, slack = rows[0].time, 1e-9
     late = [row for row in rows if AFTER_STOP + slack < row.time - stop <= until + slack]
-    up = [upward(row.pose[3:6]) for row in late]
-    alpha = [math.hypot(*tool_acceleration(row.acceleration, one)) for row, one in zip(late, up, strict=True)]
-    return [(row.time - stop, one) for row, one in zip(late, alpha, strict=True)]
+    forces = [tool_acceleration(row.acceleration, upward(row.pose[3:6])) for row in late]
+    return [(row.time - stop, math.hypot(*force)) for row, force in zip(late, forces, strict=True)]
 
 
 def table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """Return a table with aligned columns: the first one to the left, the others to the right."""
-    widths = [max(len(row[column]) for row in (heads, *rows)) for column in range(len(heads))]
-
-    def line(cells: Sequence[str]) -> str:
-        first, *others = (
-            cell.ljust(width) if column == 0 else cell.rjust(width)
-            for column, (cell, width) in enumerate(zip(cells, widths, strict=True))
-        )
-        return "  " + "  ".join([first, *others]).rstrip()
-
-    return "\n".join([line(heads), line(["-" * width for width in widths]), *map(line, rows)])
+    first, *others = [max(map(len, column)) for column in zip(heads, *rows, strict=True)]
+    lines = [heads, ["-" * width for width in (first, *others)], *rows]
+    padded = [[head.ljust(first), *map(str.rjust, cells, others)] for head, *cells in lines]
+    return "\n".join(f"  {'  '.join(cells)}".rstrip() for cells in padded)
 
 
 def figure(value: float) -> str:

@@ -103,10 +103,6 @@ class FixtureRobot(blocking.Robot):
             raise
         return self
 
-    def settle_messages(self) -> None:
-        """Wait for everything that the robot has published before now, such as the truth of the last tick."""
-        self.info()  # the answer arrives after everything published before
-
     def states(self, buffer: int = BUFFER) -> SteppingStream[State]:
         """Iterate over every state from now on; each one advances time by a tick."""
         return SteppingStream(

@@ -24,10 +24,10 @@ from tvist_controller.instruments.report import Sink
 from tvist_controller.sources.own_plants import load_plant
 from tvist_plant.plant import PERIOD
 from tvist_plant.variants import Variant
-from tvist_protocol.commands import ReleaseControl, TakeControl
+from tvist_protocol.commands import Command, ReleaseControl, TakeControl
 from tvist_protocol.errors import RefusedError
 from tvist_protocol.programs import ProgramLoad
-from tvist_protocol.replies import Accepted, Refused, Reply
+from tvist_protocol.replies import Refused
 from tvist_protocol.simulation import SimulationInject
 from tvist_protocol.stream import Event, State
 from tvist_server.config import from_mapping
@@ -51,9 +51,8 @@ class Preparation(Sink):
 
     def __init__(self, wanted: WantedRobot) -> None:
         self._wanted = wanted
-        self._later = sorted(
-            (fault for fault in wanted.faults if fault.after > 0.0), key=lambda one: one.after
-        )
+        later = [fault for fault in wanted.faults if fault.after > 0.0]
+        self._later = sorted(later, key=lambda one: one.after)
         self._robot: ServedRobot | None = None
 
     def on(self, robot: ServedRobot) -> None:
@@ -61,7 +60,7 @@ class Preparation(Sink):
         self._robot = robot
         if self._wanted.program is not None:
             name, text = self._wanted.program
-            _accepted(robot.request(ProgramLoad(name=name, text=text)))
+            _accept(robot, ProgramLoad(name=name, text=text))
         for fault in self._wanted.faults:
             if fault.after == 0.0:
                 _inject(robot, fault)
@@ -86,25 +85,23 @@ def _inject_or_log(robot: ServedRobot, fault: WantedFault) -> None:
 
 
 def _inject(robot: ServedRobot, fault: WantedFault) -> None:
-    lease = robot.controller.session.lease
-    if lease is None:
-        reply = _accepted(robot.request(TakeControl(client=CLIENT, lease_s=60.0)))
-        assert isinstance(reply, Accepted)
-        token = str(reply.token)
-    else:
-        token = lease.token
+    session = robot.controller.session
+    if free := session.lease is None:
+        _accept(robot, TakeControl(client=CLIENT, lease_s=60.0))
+    assert session.lease is not None
+    token = session.lease.token
     injected = SimulationInject(
         token=token, fault=fault.fault, joint=fault.joint, seconds=fault.seconds, value=fault.value
     )
-    _accepted(robot.request(injected))
-    if lease is None:
-        _accepted(robot.request(ReleaseControl(token=token)))
+    _accept(robot, injected)
+    if free:
+        _accept(robot, ReleaseControl(token=token))
 
 
-def _accepted(reply: Reply) -> Reply:
+def _accept(robot: ServedRobot, command: Command) -> None:
+    reply = robot.request(command)
     if isinstance(reply, Refused):
         raise RefusedError(reply)
-    return reply
 
 
 def serve(wanted: WantedRobot, connection: socket.socket) -> int:
@@ -127,38 +124,34 @@ def serve(wanted: WantedRobot, connection: socket.socket) -> int:
 
     asyncio.run(server.run(ready, ending))
     if server.failure is not None:
-        logging.getLogger(__name__).error("%s", server.failure)
-    return 0 if server.failure is None else 1
+        log.error("%s", server.failure)
+    return int(server.failure is not None)
 
 
 def _listening(wanted: WantedRobot, preparation: Preparation) -> tuple[Server, dict[str, Any]]:
     """Return a server that listens on unused ports, and the addresses."""
-    for attempt in range(ATTEMPTS):
-        address = _own_address() if wanted.ur else "127.0.0.1"
-        endpoint = f"tcp/{address}:{_free_port(address)}"
-        options: dict[str, Any] = {**wanted.options, "listen": (endpoint,)}
-        if (plant := options.get("plant")) is not None:
-            maker = load_plant(plant).maker
-            options["truth"] = isinstance(maker, Variant) or hasattr(maker, "truth")
-        if options.get("hidden") is not None:
-            options["truth"] = False
-        place: dict[str, Any] = {"endpoint": endpoint}
-        if wanted.ur:
-            usual = address != "127.0.0.1"
-            ports = {} if usual else {name: _free_port(address) for name in UrPorts.__struct_fields__}
-            options |= {"ur": True, "ur_address": address, "ur_ports": ports}
-        config = from_mapping(options, "robot")
-        try:
-            server = Server(config, lambda _: preparation)
-        except GatewayError:
-            if attempt == ATTEMPTS - 1:
-                raise
-            continue
-        if wanted.ur:
-            host, open_ports = config.interfaces(0)
-            place |= {"host": host, "ports": open_ports}
-        return server, place
-    raise AssertionError
+    for _ in range(ATTEMPTS):
+        with contextlib.suppress(GatewayError):
+            return _on_free_ports(wanted, preparation)
+    return _on_free_ports(wanted, preparation)
+
+
+def _on_free_ports(wanted: WantedRobot, preparation: Preparation) -> tuple[Server, dict[str, Any]]:
+    address = _own_address() if wanted.ur else "127.0.0.1"
+    place: dict[str, Any] = {"endpoint": f"tcp/{address}:{_free_port(address)}"}
+    options: dict[str, Any] = {**wanted.options, "listen": (place["endpoint"],)}
+    if (plant := options.get("plant")) is not None:
+        maker = load_plant(plant).maker
+        options["truth"] = isinstance(maker, Variant) or hasattr(maker, "truth")
+    if wanted.ur:
+        usual = address != "127.0.0.1"
+        ports = {} if usual else {name: _free_port(address) for name in UrPorts.__struct_fields__}
+        options |= {"ur": True, "ur_address": address, "ur_ports": ports}
+    config = from_mapping(options, "robot")
+    server = Server(config, lambda _: preparation)
+    if wanted.ur:
+        place["host"], place["ports"] = config.interfaces(0)
+    return server, place
 
 
 def _own_address() -> str:
@@ -181,27 +174,18 @@ def _obey(connection: socket.socket, server: Server, ending: Shutdown) -> None:
             if order == b"state\n":
                 robot.driven.post(robot.repeat)
                 continue
-            if order == b"close\n" and server.ur_clients:
-                _complete_recording(robot)
+            if order == b"close\n" and server.ur_clients and robot.recorder is not None:
+                # Complete the recording between two ticks, while the robot continues.
+                done = threading.Event()
+                robot.driven.post(robot.recorder.close)
+                robot.driven.post(done.set)
+                done.wait(COMPLETING)
             _tell(connection, {"clients": server.ur_clients})
             # Wait until the last client of UR's interfaces is gone, or the test's process has ended.
             while server.ur_clients and not select.select([connection], [], [], LOOK)[0]:
                 pass
             break
     ending.request()
-
-
-def _complete_recording(robot: ServedRobot) -> None:
-    """End the recording between two ticks, while the robot continues."""
-    done = threading.Event()
-
-    def complete() -> None:
-        if robot.recorder is not None:
-            robot.recorder.close()
-        done.set()
-
-    robot.driven.post(complete)
-    done.wait(COMPLETING)
 
 
 def _tell(connection: socket.socket, message: dict[str, Any]) -> None:

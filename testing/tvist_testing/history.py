@@ -2,6 +2,7 @@
 
 from array import array
 from collections import deque
+from itertools import takewhile
 from typing import TYPE_CHECKING
 
 from tvist_protocol.modes import RuntimeState
@@ -57,13 +58,11 @@ class History:
 
     def on_truth(self, truth: "Truth") -> None:
         """Add the truth of a tick, which may come before the state of its tick, or after later ones."""
-        for row in reversed(self.rows):
-            if row.tick <= truth.tick:
-                if row.tick == truth.tick:
-                    row.know(truth)
-                    return
-                break
-        self._early.append(truth)
+        row = next((row for row in reversed(self.rows) if row.tick <= truth.tick), None)
+        if row is not None and row.tick == truth.tick:
+            row.know(truth)
+        else:
+            self._early.append(truth)
 
     def on_state(self, state: "State") -> None:
         """Add a state; the one before the first tick measures nothing and is ignored."""
@@ -83,10 +82,5 @@ class History:
         The flange of the flexible arm and the measured tool are different points. So if the truth of any of
         these ticks is known, rows without it are left out.
         """
-        rows: list[HistoryRow] = []
-        for row in reversed(self.rows):
-            if row.moving:
-                break
-            rows.append(row)
-        known = [row for row in rows if row.true]
-        return (known or rows)[::-1]
+        rows = [*takewhile(lambda row: not row.moving, reversed(self.rows))][::-1]
+        return [row for row in rows if row.true] or rows

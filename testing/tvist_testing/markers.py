@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 Part = dict[str, Any]  # what a marker adds to the description of a robot
+FAULTS = "tvist_faults"  # the one marker that adds up
 FILES = (".toml", ".json")  # suffixes of files with a state
 ROBOTS = pytest.StashKey[list[Any]]()  # a test's robots, each a `serving.RobotOfTest`
 
@@ -74,16 +75,16 @@ def state(
     """State at the start: a pose such as "Q2", or a file; or q [rad], mode such as "POWER_OFF", carried payload."""
     given = {"q": q, "mode": mode, "payload": payload}
     fields = {name: value for name, value in given.items() if value is not None}
-    if start is None and not fields:
-        raise MarkerError(
-            'tvist_state has no argument: give a pose such as "Q2", a file, or q=, mode=, payload='
-        )
     part: Part = {"fields": fields} if fields else {}
     if start is not None:
         file = _text("tvist_state", start).endswith(FILES)
         if file and fields:
             raise MarkerError(f"tvist_state has the file {start} and {', '.join(fields)}: give one of both")
         part["state" if file else "start"] = start
+    if not part:
+        raise MarkerError(
+            'tvist_state has no argument: give a pose such as "Q2", a file, or q=, mode=, payload='
+        )
     return part
 
 
@@ -96,12 +97,12 @@ def faults(
     after: float = 0.0,
 ) -> Part:
     """Fault for simulation.inject with its fields, after a simulation time [s]; repeat the marker for more faults."""
-    from tvist_protocol.faults import FAULTS
+    from tvist_protocol import faults as known
 
-    if fault not in FAULTS:
-        raise MarkerError(f"tvist_faults has the fault {fault!r}: must be one of {', '.join(FAULTS)}")
-    if _number("tvist_faults", after, "a time in s") < 0.0:
-        raise MarkerError(f"tvist_faults has after={after:g}: must be at least 0 s")
+    if fault not in known.FAULTS:
+        raise MarkerError(f"{FAULTS} has the fault {fault!r}: must be one of {', '.join(known.FAULTS)}")
+    if _number(FAULTS, after, "a time in s") < 0.0:
+        raise MarkerError(f"{FAULTS} has after={after:g}: must be at least 0 s")
     return {"faults": WantedFault(fault, joint, seconds, value, float(after))}
 
 
@@ -133,7 +134,7 @@ MARKERS: dict[str, Callable[..., Part]] = {
     "tvist_plant": plant,
     "tvist_cell": cell,
     "tvist_state": state,
-    "tvist_faults": faults,
+    FAULTS: faults,
     "tvist_program": program,
     "tvist_seed": seed,
 }
@@ -152,17 +153,11 @@ def described() -> list[str]:
 def combined(item: pytest.Item) -> Part:
     """Return the combined description of all markers of a test; the nearest of equal ones counts, but faults add up."""
     found: Part = {}
-    injected: list[WantedFault] = []
     for name, function in MARKERS.items():
-        markers = list(item.iter_markers(name))
-        for marker in markers if name == "tvist_faults" else markers[:1]:
-            part = _called(name, function, marker)
-            if "faults" in part:
-                injected.insert(0, part["faults"])  # markers come from the nearest to the farthest
-            else:
-                found |= part
-    found["faults"] = tuple(injected)
-    return found
+        if name != FAULTS and (marker := item.get_closest_marker(name)) is not None:
+            found |= _called(name, function, marker)
+    injected = [_called(FAULTS, faults, marker)["faults"] for marker in item.iter_markers(FAULTS)]
+    return found | {"faults": tuple(injected[::-1])}  # in the order of the source: markers come nearest first
 
 
 def _called(name: str, function: Callable[..., Part], marker: pytest.Mark) -> Part:

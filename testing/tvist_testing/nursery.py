@@ -8,6 +8,7 @@ the socket FD, with one end of the robot's own socket. However the test's proces
 so this process and all its robots end.
 """
 
+import asyncio
 import gc
 import os
 import signal
@@ -40,22 +41,20 @@ def main(number: int) -> None:
 
 def warm_up() -> None:
     """Run a short motion, which loads or compiles every kernel that a robot usually needs."""
+    from tvist_client.robot import Robot
+    from tvist_client.transports.loopback import LoopbackTransport
     from tvist_controller.loopback import LoopbackHost
-    from tvist_protocol.codec import decode_reply, encode
-    from tvist_protocol.commands import MoveJ, TakeControl
-    from tvist_protocol.replies import Accepted
-    from tvist_protocol.simulation import SimulationStep
     from tvist_server.config import ServeConfig
     from tvist_testing import forked_robot  # noqa: F401  what a robot imports before it serves
 
-    setup = ServeConfig(clock="lockstep", truth=True).setup()
-    host = LoopbackHost(setup)
-    reply = decode_reply(host.request("nursery", encode(TakeControl(client="nursery", lease_s=60.0))))
-    assert isinstance(reply, Accepted)
-    assert reply.token is not None
-    near = tuple(angle + 0.01 for angle in setup.q)
-    host.request("nursery", encode(MoveJ(token=reply.token, q=near)))
-    host.request("nursery", encode(SimulationStep(token=reply.token, ticks=100)))
+    setup = ServeConfig(clock="free", truth=True).setup()
+    transport = LoopbackTransport(LoopbackHost(setup))
+
+    async def move() -> None:
+        async with Robot.over(transport) as robot, robot.control("nursery") as arm:
+            await arm.move_j([angle + 0.01 for angle in setup.q])
+
+    asyncio.run(move())
 
 
 def _receive(requests: socket.socket) -> tuple[bytes, list[int]]:

@@ -6,7 +6,7 @@ robot imports the rest.
 
 import sys
 import traceback
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator
 from typing import TYPE_CHECKING
 
 import pytest
@@ -50,9 +50,8 @@ def pytest_configure(config: pytest.Config) -> None:
 
 def pytest_unconfigure(config: pytest.Config) -> None:
     """End the process that makes robots; a session fixture would end before the last test's report."""
-    serving = config.stash.get(_SERVING, None)
-    if serving is not None:
-        serving.close()
+    if _SERVING in config.stash:
+        config.stash[_SERVING].close()
 
 
 @pytest.fixture(scope="session")
@@ -60,8 +59,7 @@ def _tvist_serving(request: pytest.FixtureRequest) -> "Serving":
     """The maker of robots for this session."""
     from tvist_testing.robots import unavailable
 
-    why = unavailable()
-    if why is not None:
+    if (why := unavailable()) is not None:
         pytest.fail(why, pytrace=False)
     from tvist_testing.serving import Serving
 
@@ -74,34 +72,28 @@ def _tvist_serving(request: pytest.FixtureRequest) -> "Serving":
 @pytest.fixture
 def tvist_robots(
     request: pytest.FixtureRequest, _tvist_serving: "Serving"
-) -> Iterator[Callable[[int], "list[FixtureRobot]"]]:
+) -> Callable[[int], "list[FixtureRobot]"]:
     """Make robots: `tvist_robots(3)` returns three like `tvist_robot` with different names, endpoints and seeds."""
     made: list[FixtureRobot] = []
 
     def make(count: int) -> "list[FixtureRobot]":
-        robots = _tvist_serving.robots(request.node, count, len(made))
+        robots = _tvist_serving.robots(request, count, len(made))
         made.extend(robots)
         return robots
 
-    yield make
-    for robot in made:
-        robot.close()
+    return make
 
 
 @pytest.fixture
-def tvist_robot(request: pytest.FixtureRequest, _tvist_serving: "Serving") -> Iterator["FixtureRobot"]:
+def tvist_robot(request: pytest.FixtureRequest, _tvist_serving: "Serving") -> "FixtureRobot":
     """The test's own robot in lockstep, ready to be read and moved."""
-    robot = _tvist_serving.robot(request.node)
-    yield robot
-    robot.close()
+    return _tvist_serving.robot(request)
 
 
 @pytest.fixture
-def tvist_ur(request: pytest.FixtureRequest, _tvist_serving: "Serving") -> Iterator["FixtureRobot"]:
+def tvist_ur(request: pytest.FixtureRequest, _tvist_serving: "Serving") -> "FixtureRobot":
     """The test's own robot in real time, with UR's interfaces on its own address."""
-    robot = _tvist_serving.robot(request.node, ur=True)
-    yield robot
-    robot.close()
+    return _tvist_serving.robot(request, ur=True)
 
 
 @pytest.hookimpl(wrapper=True)
@@ -124,10 +116,7 @@ def pytest_runtest_makereport(
         if call.excinfo is None:
             _release_locals()
         for robot in robots:
-            if told or keep_all:
-                robot.keep()
-            else:
-                robot.discard()
+            (robot.keep if told or keep_all else robot.discard)()
         del item.stash[ROBOTS]
         item.stash[_TOLD] = False  # a test may run again
     return report
@@ -147,13 +136,9 @@ def _release_locals() -> None:
 
 def _tell(item: pytest.Item, report: pytest.TestReport, robots: "list[RobotOfTest]") -> None:
     _note(item, report, robots)
+    add = getattr(report.longrepr, "addsection", lambda *section: report.sections.append(section))
     for robot in robots:
-        title = f"tvist: robot {robot.recording.stem}"
-        add = getattr(report.longrepr, "addsection", None)
-        if add is None:
-            report.sections.append((title, robot.described()))
-        else:
-            add(title, robot.described())
+        add(f"tvist: robot {robot.recording.stem}", robot.described())
 
 
 def _note(item: pytest.Item, report: pytest.TestReport, robots: "list[RobotOfTest]") -> None:

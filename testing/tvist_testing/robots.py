@@ -8,7 +8,6 @@ import socket
 import subprocess
 import sys
 from importlib.util import find_spec
-from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -46,7 +45,6 @@ class RobotProcess:
         self.ports: dict[str, int] = told.get("ports", {})
         self.pid = int(told["pid"])
         self.closed = False
-        self._left = False
         self._connection = connection
 
     def publish_state(self) -> None:
@@ -73,15 +71,14 @@ class RobotProcess:
             self._connection.settimeout(ENDING)
             self._connection.sendall(order)
             if _line(self._connection).get("clients"):
-                self.closed = self._left = True
+                self.closed = True
                 return
             self._wait()
         self.kill()
 
     def forget(self) -> None:
         """Leave a robot with clients alone: it ends when this process has ended, together with its clients."""
-        if self._left:
-            self._connection.detach()
+        self._connection.detach()
 
     def kill(self) -> None:
         """Kill the robot's process, even if a test has stopped it; its recording stays incomplete."""
@@ -104,21 +101,21 @@ class Robots:
     """The process that makes robots, started with the first one; there is one for each process of tests."""
 
     def __init__(self) -> None:
-        self._process: subprocess.Popen[bytes] | None = None
-        self._requests: socket.socket | None = None
+        self._running: tuple[subprocess.Popen[bytes], socket.socket] | None = None
         self._served: list[RobotProcess] = []
 
     def serve(self, wanted: WantedRobot) -> RobotProcess:
         """Serve a robot; return it when it answers. Raise CannotServeError if it cannot start."""
-        if self._requests is None or (self._process is not None and self._process.poll() is not None):
-            self._start()
-        assert self._requests is not None
+        if self._running is None or self._running[0].poll() is not None:
+            self.close()
+            self._running = _started()
+        _, requests = self._running
         ours, theirs = socket.socketpair()
         ours.settimeout(PATIENCE)
         with theirs:
             line = msgspec.json.encode(wanted) + b"\n"
-            sent = socket.send_fds(self._requests, [line], [theirs.fileno()])
-            self._requests.sendall(line[sent:])
+            sent = socket.send_fds(requests, [line], [theirs.fileno()])
+            requests.sendall(line[sent:])
         told = _line(ours)
         if "endpoint" not in told:
             ours.close()
@@ -130,52 +127,43 @@ class Robots:
     def close(self) -> None:
         """End the process and robots that still run."""
         for served in self._served:
-            if served.closed:
-                served.forget()
-            else:
-                served.kill()
+            (served.forget if served.closed else served.kill)()
         self._served.clear()
-        if self._requests is not None:
-            self._requests.close()
-            self._requests = None
-        if self._process is not None:
-            self._process.wait(PATIENCE)
-            self._process = None
+        if self._running is not None:
+            process, requests = self._running
+            requests.close()
+            process.wait(PATIENCE)
+        self._running = None
 
-    def _start(self) -> None:
-        why = unavailable()
-        if why is not None:
-            raise CannotServeError(why)
-        self.close()
-        ours, theirs = socket.socketpair()
-        ours.settimeout(PATIENCE)
-        environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
-        # Small matrices need no threads, and a process with threads cannot fork safely.
-        for threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
-            environment[threads] = "1"
-        with theirs:
-            self._process = subprocess.Popen(  # noqa: S603  this interpreter and a module of this package
-                [sys.executable, "-m", "tvist_testing.nursery", str(theirs.fileno())],
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                pass_fds=[theirs.fileno()],
-                env=environment,
-                cwd=Path.cwd(),
-            )
-        if not ours.recv(64):
-            ours.close()
-            raise CannotServeError(
-                "the process that makes robots ended at its start: see what it wrote to stderr"
-            )
-        self._requests = ours
+
+def _started() -> tuple[subprocess.Popen[bytes], socket.socket]:
+    """Start the process; return it and the socket for requests."""
+    ours, theirs = socket.socketpair()
+    ours.settimeout(PATIENCE)
+    # Small matrices need no threads, and a process with threads cannot fork safely.
+    single = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+    with theirs:
+        process = subprocess.Popen(  # noqa: S603  this interpreter and a module of this package
+            [sys.executable, "-m", "tvist_testing.nursery", str(theirs.fileno())],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            pass_fds=[theirs.fileno()],
+            env={**os.environ, "PYTHONUNBUFFERED": "1", **single},
+        )
+    if not ours.recv(64):
+        ours.close()
+        process.wait(PATIENCE)
+        raise CannotServeError(
+            "the process that makes robots ended at its start: see what it wrote to stderr"
+        )
+    return process, ours
 
 
 def unavailable() -> str | None:
     """Return why no robot can be served here; None if one can."""
     if not hasattr(os, "fork"):
         return "tvist's fixtures need Linux or macOS: this system has no fork"
-    missing = [name for name in NEEDED if find_spec(name) is None]
-    if missing:
+    if missing := [name for name in NEEDED if find_spec(name) is None]:
         return (
             f"tvist's fixtures need the server's packages ({', '.join(missing)} "
             f"{'is' if len(missing) == 1 else 'are'} missing): pip install 'tvist[testing]'"

@@ -4,6 +4,7 @@ import itertools
 import json
 import re
 import shutil
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -42,7 +43,6 @@ class RobotOfTest:
         self.kept.mkdir(parents=True, exist_ok=True)
         for file in self.files:
             if file.exists():
-                (self.kept / file.name).unlink(missing_ok=True)
                 shutil.move(file, self.kept / file.name)
 
     def discard(self) -> None:
@@ -65,11 +65,10 @@ class RobotOfTest:
             f"seed:      {seed}",
             f"next:      tvist log analyze {recording}; tvist log replay {recording}",
         ]
-        try:
+        with suppress(OSError):
             told = self.files[1].read_text(encoding="utf-8", errors="replace").splitlines()
-        except OSError:
-            told = []
-        return "\n".join([*lines, *(["its log ends with:", *told[-LOG_LINES:]] if told else [])])
+            lines += ["its log ends with:", *told[-LOG_LINES:]]
+        return "\n".join(lines)
 
 
 class Serving:
@@ -87,23 +86,22 @@ class Serving:
         self._robots.close()
         self._own.close()
 
-    def robots(self, item: pytest.Item, count: int, before: int) -> list[FixtureRobot]:
+    def robots(self, request: pytest.FixtureRequest, count: int, before: int) -> list[FixtureRobot]:
         """Make several robots of a test."""
         if not isinstance(count, int) or not 1 <= count <= MAX_ROBOTS - before:
-            pytest.fail(
-                f"tvist_robots({count!r}): the number of a test's robots is 1 to {MAX_ROBOTS}", pytrace=False
-            )
+            why = f"tvist_robots has {count!r}: must be 1 to {MAX_ROBOTS - before} robots"
+            pytest.fail(why, pytrace=False)
         numbers = range(before, before + count)
-        return [self.robot(item, f"{NAME}-{number + 1}", number) for number in numbers]
+        return [self.robot(request, f"{NAME}-{number + 1}", number) for number in numbers]
 
     def robot(
-        self, item: pytest.Item, name: str = NAME, number: int = 0, *, ur: bool = False
+        self, request: pytest.FixtureRequest, name: str = NAME, number: int = 0, *, ur: bool = False
     ) -> FixtureRobot:
-        """Make a robot of a test; fail the test with one line if that is impossible."""
+        """Make a robot that ends with its test; fail the test with one line if that is impossible."""
+        item: pytest.Item = request.node
         folder = self._own.path / str(next(self._numbers))
         folder.mkdir()
         recording = folder / f"{name}.mcap"
-        failure = ""
         try:
             part = combined(item)
             seed = part.pop("seed", self._seed) + number
@@ -114,11 +112,12 @@ class Serving:
                 served.kill()
                 raise
         except (MarkerError, CannotServeError) as error:
-            failure = f"the robot of this test cannot be made: {error}"
+            what = f"the robot of this test cannot be made: {error}"
+            raise pytest.fail.Exception(what, pytrace=False) from None
         except TvistError as error:
-            failure = f"the robot of this test does not answer: {error}"
-        if failure:
-            pytest.fail(failure, pytrace=False)
+            what = f"the robot of this test does not answer: {error}"
+            raise pytest.fail.Exception(what, pytrace=False) from None
+        request.addfinalizer(robot.close)
         kept = self._kept / re.sub(r"[^A-Za-z0-9_.-]+", "-", item.nodeid).strip("-")[-LONGEST_NAME:]
         item.stash.setdefault(ROBOTS, []).append(RobotOfTest(served, recording, kept, seed))
         return robot

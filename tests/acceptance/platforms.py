@@ -1,4 +1,4 @@
-"""Which distributions can be had as wheels alone, for each Python and platform, for docs/reference/platforms.md.
+"""Print which distributions install from wheels alone, by Python and platform, for docs/reference/platforms.md.
 
     python tests/acceptance/platforms.py [--uv PROGRAM]
 
@@ -22,7 +22,7 @@ PURE = ("forbiddenfruit",)  # packages without any wheel whose source is Python 
 
 
 def missing(uv, what, python, platform):
-    """The package that has no wheel, or nothing if all have one."""
+    """Return a package that has no wheel; empty if all have one."""
     extra = what.partition("[")[2].rstrip("]")
     ended = subprocess.run(
         [

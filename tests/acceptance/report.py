@@ -1,4 +1,4 @@
-"""Results of acceptance tests: each test notes its own, and the page of tested clients is made from them.
+"""Results of acceptance tests: each test notes its own; they make the page of tested clients.
 
 python3 tests/acceptance/report.py
 """
@@ -18,7 +18,7 @@ PASSED = "passed"
 
 
 def note(client: str, version: str, outcomes: Mapping[str, str], why: Mapping[str, str]) -> None:
-    """Keep what came of each test or call of a client, and why some are known not to pass."""
+    """Keep the outcome of each test or call of a client, and why some are known to fail."""
     command = ["git", "rev-parse", "--short", "HEAD"]
     git = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
     failed = {name: came for name, came in outcomes.items() if came != PASSED}
@@ -33,7 +33,7 @@ def note(client: str, version: str, outcomes: Mapping[str, str], why: Mapping[st
 
 
 def with_results(page: str, results: Mapping[str, Any]) -> str:
-    """Return the page with these results in place of those that it has."""
+    """Return the page with these results instead of its present ones."""
     lines = ["| client | version | on | TVIST | passed |", "|---|---|---|---|---:|"]
     counts: dict[str, list[int]] = {}
     for client, one in sorted(results.items()):

@@ -87,7 +87,7 @@ EXAMPLES = {
 
 
 class Result(NamedTuple):
-    """What came of one test or example."""
+    """Outcome of one test or example."""
 
     name: str
     outcome: str  # "passed", or another word
@@ -162,7 +162,7 @@ def test(at_client: list[str], sources: Path, program: Path, name: str, mode: Se
 
 
 def run(command: list[str], name: str, folder: Path, log: str) -> tuple[Result, bytes]:
-    """Run a command; return what came of it and what it printed."""
+    """Run a command; return its outcome and what it printed."""
     env = {**os.environ, "ROBOT_MODEL": "ur5e", "URSIM_VERSION": "latest"}
     began, path = time.monotonic(), LOGS / f"{log}.txt"
     with path.open("ab+") as file:
@@ -180,7 +180,7 @@ def run(command: list[str], name: str, folder: Path, log: str) -> tuple[Result, 
 
 
 def report(title: str, results: Sequence[Result], known: dict[str, str]) -> int:
-    """Print the results that are no success; return how many of them have no known reason."""
+    """Print the failures; return how many of them have no known reason."""
     failed = [one for one in results if one.outcome != "passed"]
     print(f"{title}: {len(results) - len(failed)} of {len(results)} passed", flush=True)
     for one in failed:

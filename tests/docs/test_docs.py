@@ -13,6 +13,7 @@ import shlex
 import signal
 import textwrap
 import tomllib
+from importlib.metadata import entry_points
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -157,7 +158,7 @@ class TestCommands:
 def check_command(words):
     program, *arguments = words
     match program.removeprefix(".venv/bin/"):
-        case "tvist" | "marimo" | "dask" as name:
+        case "tvist" | "marimo" as name:
             verbs = list(itertools.takewhile(lambda word: re.fullmatch(r"[a-z][\w-]*,?", word), arguments))
             words = None if name == "marimo" else 1 + (verbs[:1] == ["log"])
             verbs = [word.rstrip(",") for word in verbs][:words]
@@ -184,9 +185,12 @@ def options(program, *verbs):
         application(verbs).help_print(verbs, console=Console(file=stream, width=100))
         told = stream.getvalue()
         assert f"tvist {' '.join(verbs)}" in told
-    else:
-        told = run("-m", program, *verbs, "--help")
-    return set(re.findall(r"--[\w-]+", told))
+        return set(re.findall(r"--[\w-]+", told))
+    (script,) = entry_points(group="console_scripts", name=program)
+    command = script.load()
+    for verb in verbs:
+        command = command.commands[verb]
+    return {option for parameter in command.params for option in parameter.opts}
 
 
 @pytest.fixture(scope="module")

@@ -49,7 +49,7 @@ def serve(served, words):
 
 
 def run(words, code, *, moves):
-    """Run a command until it ends with its exit code, because a machine under load may lose the moved arm."""
+    """Run a command until it ends with its exit code, since a machine under load may lose the moved arm."""
     for _ in range(ATTEMPTS):
         ended = finished(*words)
         if ended.returncode == code or not moves:

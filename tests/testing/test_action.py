@@ -1,4 +1,4 @@
-"""The action for other people's CI: its shell runs here, as the runner would run it."""
+"""The action for users' CI: its script runs here as a runner would run it."""
 
 import os
 import re
@@ -26,7 +26,7 @@ pytestmark = pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash
 
 @pytest.fixture
 def run(tmp_path):
-    """Run a step in a folder of its own, with nothing of this process's environment."""
+    """Run a step in a folder of its own, without this process's environment."""
 
     def step(*arguments, python=sys.executable):
         kept = {name: os.environ[name] for name in ("PATH", "HOME", "LANG") if name in os.environ}
@@ -53,12 +53,11 @@ def test_every_step_of_the_action_calls_its_script():
     assert used == known
 
 
-def test_test_step_runs_tests_and_outputs_recordings_of_failed_ones(run, tmp_path):
-    (tmp_path / "test_it.py").write_text(TESTS)
-    ran = run("test", "test_it.py", "-q")
-    assert (ran.returncode, "1 failed, 1 passed" in ran.stdout) == (1, True), ran.stdout + ran.stderr
-    recordings = Path(outputs(tmp_path)["recordings"])
-    assert [path.name for path in recordings.rglob("*.mcap")] == ["ur5e.mcap"]
+def test_test_step_runs_pytest_and_outputs_its_folder_of_recordings(run, tmp_path):
+    ran = run("test", "test_it.py", "-q", python="echo")
+    recordings = outputs(tmp_path)["recordings"]
+    assert recordings == str(tmp_path / "tvist-recordings")
+    assert ran.stdout.split() == ["-m", "pytest", "--tvist-recordings", recordings, "test_it.py", "-q"]
 
 
 def test_invalid_step_is_refused_in_one_line(run):
@@ -99,4 +98,6 @@ def test_action_installs_serves_and_tests_in_a_clean_environment(run, tmp_path):
     assert run("stop", python=python).returncode == 0
     (tmp_path / "test_it.py").write_text(TESTS)
     ran = run("test", "test_it.py", "-q", python=python)
-    assert "1 failed, 1 passed" in ran.stdout, ran.stdout + ran.stderr
+    assert (ran.returncode, "1 failed, 1 passed" in ran.stdout) == (1, True), ran.stdout + ran.stderr
+    recordings = Path(outputs(tmp_path)["recordings"])
+    assert [path.name for path in recordings.rglob("*.mcap")] == ["ur5e.mcap"]

@@ -1,4 +1,4 @@
-"""The fixtures, as a test of other people's code uses them: robots are separate, ready, and step their own time."""
+"""The fixtures as users' tests use them: robots are separate, ready, and step their own time."""
 
 import itertools
 import os
@@ -12,10 +12,12 @@ import pytest
 
 from tvist_client import MotionStoppedError
 from tvist_client.errors import ClientError
+from tvist_lab.recordings import mcap_file
 from tvist_plant.plant import Measurement
 from tvist_protocol.modes import RobotMode, SafetyMode
-from tvist_testing import assert_settles_within
+from tvist_testing import assert_residual_vibration_below, assert_settles_within
 from tvist_testing import robots as making
+from tvist_testing.markers import ROBOTS
 
 TARGET = [0.5, -3.1, 0.2, -1.6, 0.0, 0.0]
 OTHER_PROGRAM = """
@@ -27,7 +29,7 @@ with Robot.connect(sys.argv[1]) as robot, robot.control("other") as arm:
 
 
 class Echo:
-    """An arm that does what it is told, and knows no truth."""
+    """An arm that follows its commands exactly, and has no truth to publish."""
 
     def __init__(self, _description, payload):
         self.payload = payload
@@ -67,6 +69,15 @@ def test_robot_starts_at_rest_with_its_own_log_and_recording(tvist_robot):
     assert tvist_robot.state().reference_q == TARGET
     assert "motion_started" in tvist_robot.log.read_text()
     assert tvist_robot.recording.is_file()
+
+
+def test_kept_robot_leaves_a_complete_recording_and_its_log(tvist_robot, request, tmp_path):
+    tvist_robot.advance(5)
+    (of_test,) = request.node.stash[ROBOTS]
+    of_test.kept = tmp_path
+    of_test.keep()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["ur5e.log", "ur5e.mcap"]
+    assert mcap_file.read(tmp_path / "ur5e.mcap").complete
 
 
 class TestTime:
@@ -154,12 +165,12 @@ def test_ur_interfaces_answer_on_their_own_address_and_move_the_arm(tvist_ur):
         assert dashboard.recv(1024).startswith(b"Connected")
         dashboard.sendall(b"robotmode\n")
         assert dashboard.recv(1024) == b"Robotmode: RUNNING\n"
-    target = [angle + 0.1 for angle in tvist_ur.state().reference_q]
+    target = [angle + 0.02 for angle in tvist_ur.state().reference_q]
     with socket.create_connection((tvist_ur.host, tvist_ur.ports["secondary"])) as scripts:
         scripts.sendall(f"movej({target}, a=3, v=1)\n".encode())
         while tvist_ur.state().reference_q != pytest.approx(target, abs=1e-6):
             pass
-    assert_settles_within(tvist_ur, 0.5)
+    assert_residual_vibration_below(tvist_ur, 2.0, window=0.05)
     assert (tvist_ur.info().clock, tvist_ur.info().payload.mass) == ("realtime", 3.0)
 
 

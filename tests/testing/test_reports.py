@@ -1,4 +1,4 @@
-"""What remains of a failed test: recording, log and seed, named in the report and in JUnit. Of others: nothing."""
+"""A failed test leaves recording, log and seed, which its report and JUnit name; other tests leave nothing."""
 
 import os
 import select
@@ -16,17 +16,8 @@ pytest_plugins = ["pytester"]
 KERNELS = str(own_folder())
 
 ABSENT = ("scipy", "matplotlib", "mujoco", "polars", "marimo", "distributed", "tvist_lab", "tvist_view")
-"""Packages that the extra `testing` does not bring."""
-HIDDEN = f"""
-import sys
-
-class Hidden:
-    def find_spec(self, name, path=None, target=None):
-        if name.partition(".")[0] in {ABSENT!r}:
-            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
-
-sys.meta_path.insert(0, Hidden())
-"""
+"""Packages that the extra `testing` does not install."""
+HIDDEN = f"import sys; sys.modules.update(dict.fromkeys({ABSENT!r}))"
 OUTCOMES = """
 import pytest
 from tvist_testing import assert_settles_within
@@ -60,46 +51,26 @@ def test_fails_without_a_robot():
 def test_two_fail(tvist_robots):
     assert not tvist_robots(2)
 """
-MISUSES = """
-import pytest
-pytestmark = pytest.mark.usefixtures("tvist_robot")
-mark = pytest.mark
-
-@pytest.mark.parametrize("number", [
-    pytest.param(0, marks=mark.tvist_payload(500.0)),
-    pytest.param(1, marks=mark.tvist_payload("heavy")),
-    pytest.param(2, marks=mark.tvist_shaper("nosuch")),
-    pytest.param(3, marks=mark.tvist_robot("nosuch")),
-    pytest.param(4, marks=mark.tvist_state()),
-    pytest.param(5, marks=mark.tvist_state("nosuch.toml")),
-    pytest.param(6, marks=mark.tvist_state(mode="ASLEEP")),
-    pytest.param(7, marks=mark.tvist_faults("nosuch")),
-    pytest.param(8, marks=mark.tvist_faults("torque")),
-    pytest.param(9, marks=mark.tvist_faults("reduced", after=-1.0)),
-    pytest.param(10, marks=mark.tvist_program("def go(:\\n")),
-    pytest.param(11, marks=mark.tvist_program("nosuch.script")),
-    pytest.param(12, marks=mark.tvist_seed("one")),
-    pytest.param(13, marks=mark.tvist_payload(1.0, 2.0)),
-])
-def test_it(number):
-    raise AssertionError("it began")
-"""
-SAID = [
-    "payload is 500.0: must be at most 100",
-    "tvist_payload has 'heavy': must be a mass in kg",
-    "shaper",
-    "nosuch",
-    "tvist_state has no argument",
-    "state nosuch.toml: No such file or directory",
-    "mode",
-    "tvist_faults has the fault 'nosuch': must be one of protective_stop, reduced",
-    "torque",
-    "tvist_faults has after=-1: must be at least 0 s",
-    "line:1",
-    "tvist_program has the file nosuch.script: No such file or directory",
-    "tvist_seed has 'one': must be a whole number",
-    "tvist_payload has wrong arguments, too many positional arguments: it takes kilograms",
+MISUSES = [
+    ("payload(500.0)", "payload is 500.0: must be at most 100"),
+    ("payload('heavy')", "tvist_payload has 'heavy': must be a mass in kg"),
+    (
+        "payload(1.0, 2.0)",
+        "tvist_payload has wrong arguments, too many positional arguments: it takes kilograms",
+    ),
+    ("shaper('nosuch')", "shaper"),
+    ("robot('nosuch')", "nosuch"),
+    ("state()", "tvist_state has no argument"),
+    ("state('nosuch.toml')", "state nosuch.toml: No such file or directory"),
+    ("state(mode='ASLEEP')", "mode"),
+    ("faults('nosuch')", "tvist_faults has the fault 'nosuch': must be one of protective_stop, reduced"),
+    ("faults('torque')", "torque"),
+    ("faults('reduced', after=-1.0)", "tvist_faults has after=-1: must be at least 0 s"),
+    ("program('def go(:\\n')", "line:1"),
+    ("program('nosuch.script')", "tvist_program has the file nosuch.script: No such file or directory"),
+    ("seed('one')", "tvist_seed has 'one': must be a whole number"),
 ]
+"""Markers with invalid arguments, and what the test's error says."""
 
 
 def outcomes(path):
@@ -119,7 +90,7 @@ def _kernels(monkeypatch):
 
 @pytest.fixture
 def light(pytester, monkeypatch):
-    """A folder whose tests see nothing of what the extra `testing` does not bring."""
+    """A folder whose tests cannot import what the extra `testing` does not install."""
     hidden = pytester.mkdir("hidden")
     (hidden / "sitecustomize.py").write_text(HIDDEN)
     monkeypatch.setenv("PYTHONPATH", str(hidden))
@@ -155,10 +126,17 @@ def test_recordings_are_kept_only_for_failed_tests(light):
 
 @pytest.mark.nightly
 def test_markers_with_invalid_arguments_fail_with_one_line(pytester):
-    pytester.makepyfile(MISUSES)
+    marks = [f"pytest.mark.tvist_{mark}" for mark, _ in MISUSES]
+    params = [f"pytest.param({number}, marks={mark})" for number, mark in enumerate(marks)]
+    pytester.makepyfile(f"""
+        import pytest
+        @pytest.mark.parametrize("number", [{", ".join(params)}])
+        def test_it(tvist_robot, number):
+            raise AssertionError("it began")
+    """)
     ran = pytester.runpytest_subprocess("--junitxml=report.xml", "--strict-markers")
-    ran.assert_outcomes(errors=len(SAID))
-    for number, said in enumerate(SAID):
+    ran.assert_outcomes(errors=len(MISUSES))
+    for number, (_, said) in enumerate(MISUSES):
         error = outcomes("report.xml")[f"test_it[{number}]"].find("error")
         text = error.text.strip()
         assert said in text
@@ -194,7 +172,7 @@ def test_parallel_workers_have_separate_robots(pytester):
 @pytest.mark.nightly
 @pytest.mark.realtime
 def test_open_ur_rtde_clients_do_not_abort_the_tests(pytester):
-    """In a failed test, by a fixture, and for good: the robot goes on until they have gone."""
+    """A robot continues until its clients are gone, even if a failed test, a fixture or a global keeps them."""
     pytest.importorskip("rtde_io")
     pytester.makepyfile("""
         import pytest, rtde_io
@@ -224,7 +202,7 @@ def test_open_ur_rtde_clients_do_not_abort_the_tests(pytester):
 
 @pytest.mark.skipif(not hasattr(os, "pidfd_open"), reason="needs Linux")
 def test_robots_end_with_the_process_of_the_tests(pytester):
-    """However it ends: here at once, without any clean-up."""
+    """Here that process ends at once, without any clean-up."""
     pytester.makepyfile("""
         import os
         def test_it(tvist_robot):
@@ -243,7 +221,7 @@ def test_robots_end_with_the_process_of_the_tests(pytester):
 
 
 def test_loading_the_plugin_imports_only_pytest(pytester):
-    """It is loaded for the tests of every project that has the client."""
+    """pytest loads the plugin in every project in which the client is installed."""
     pytester.makepyfile(f"""
         import sys
         def test_it():

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 import pytest
 from tests import forked
-from tests.conformance.served import PATIENCE
+from tests.conformance.served import Served
 from tools.film import FLAGS
 from tools.film import browser as browser_that_draws
 
@@ -19,7 +19,7 @@ ARGUMENTS = [flag for flag in FLAGS if not flag.startswith("--headless")]  # pla
 
 @contextmanager
 def browser():
-    """Chromium; without one the test is skipped, but not in CI."""
+    """Start Chromium; if there is none, skip the test, but fail in CI."""
     if CHROMIUM is None:
         if os.environ.get("CI"):
             raise AssertionError("there is no Chromium: .ci/run installs it")
@@ -34,15 +34,16 @@ def browser():
             started.close()
 
 
-class Page:
-    """A process that serves a page, `tvist view` by default; `url` is where its page is."""
+class Page(Served):
+    """A process that serves a page by `tvist view`; `url` is where its page is."""
 
-    def __init__(self, *arguments, command="view"):
-        self.lines = []
-        self._news = threading.Condition()
+    program = ("-m", "tvist_cli", "view")
+
+    def __init__(self, *arguments):
+        self._news, self.lines = threading.Condition(), []
         self.process = forked.Popen(
-            [sys.executable, "-m", "tvist_cli", command, *map(str, arguments), "--port", "0"],
-            stdout=subprocess.PIPE,
+            [sys.executable, *self.program, *map(str, arguments), "--port", "0"],
+            stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,
             env={**os.environ, "PYTHONUNBUFFERED": "1", "COLUMNS": "200"},
@@ -50,30 +51,12 @@ class Page:
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
-    def __enter__(self):
-        self.said(r"http://")
-        return self
+    def wait_until_ready(self):
+        self.wait_until_said("http://")
 
     def __exit__(self, *error):
-        if self.process.poll() is None:
-            self.process.kill()
-        self.process.wait(PATIENCE)
-        self._reader.join(PATIENCE)
-        self.process.stdout.close()
-        self.process.stderr.close()
+        self.kill()
 
     @property
     def url(self):
-        return re.search(r"http://\S+", "".join(self.lines)).group()
-
-    def said(self, words):
-        """Wait until it says something on stderr."""
-        with self._news:
-            assert self._news.wait_for(lambda: re.search(words, "".join(self.lines)), PATIENCE), self.lines
-        return "".join(self.lines)
-
-    def _read(self):
-        for line in self.process.stderr:
-            with self._news:
-                self.lines.append(line)
-                self._news.notify_all()
+        return re.search(r"http://\S+", self.said).group()

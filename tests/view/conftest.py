@@ -1,4 +1,4 @@
-"""Runs that several files draw."""
+"""Recorded runs that several test files draw."""
 
 import asyncio
 

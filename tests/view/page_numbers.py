@@ -1,4 +1,4 @@
-"""Numbers of the packages, with which those of the page for trying shaping are compared."""
+"""Numbers that the packages compute, to compare with those of the interactive shaping page."""
 
 import numpy as np
 from scipy.signal import TransferFunction, lsim
@@ -33,7 +33,7 @@ SWING = (4.3, 0.05), (5.0, 0.05)  # f_d [Hz] and ζ of the mass, and those for w
 
 
 def of_shaper(name, f_d, zeta):
-    """Impulses, and the residual at some true frequencies, which come first."""
+    """Return some true frequencies, and a shaper's impulses with its residual at these frequencies."""
     made, true = SHAPERS[name].impulses(f_d, zeta), f_d * np.array(RATIOS)
     return true.tolist(), {"A": made.A, "tau": made.tau, "residual": residual(true, zeta, made)}
 

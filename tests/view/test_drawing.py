@@ -1,9 +1,7 @@
-"""The arm that the page draws, in a browser: against pinocchio and against the simulated arm's truth."""
+"""The arm that the page draws in a browser, compared with pinocchio and the simulated arm's truth."""
 
-import asyncio
-import itertools
 import struct
-import threading
+from urllib.parse import urlsplit
 
 import numpy as np
 import pinocchio as pin
@@ -17,13 +15,14 @@ from tvist_plant.model import FLANGE, flexible_model, rigid_model
 from tvist_protocol.geometry import Capsule, Geometry, Mesh, World
 from tvist_view.look import GeometryError, Look
 from tvist_view.playback import playback
-from tvist_view.stage import open_stage, page
+from tvist_view.stage import page
 from tvist_view.track import Track
 
 from .browser import browser
 
 SEVEN = "tests/plant/urdf/seven.urdf"
-ARMS = ("one-joint", "ur5e", SEVEN)
+ARMS = ("ur5e", SEVEN, "one-joint")
+"""Arms of the page; the first one moves."""
 UR5E = load("ur5e")
 
 
@@ -33,9 +32,51 @@ def look_of(name):
 
 
 def standing(moved, look):
-    """One state of an arm of as many joints."""
+    """Return three states of an arm at rest that has as many joints as the look."""
     zeros = [0.0] * look.joints
     return [replace(state, actual_q=zeros, reference_q=zeros, target_qdd=zeros) for state in moved.states[:3]]
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"version": 2}, "version 2"),
+        ({"a": [0.1]}, "1 a, 2 d and 2 alpha"),
+        ({"a": [], "d": [], "alpha": []}, "no joints"),
+        ({"bending": [2]}, "link 2: must be 0 to 1"),
+        (
+            {"capsules": [Capsule(name="x", link=5, start=(0, 0, 0), end=(0, 0, 1), radius=0.1)]},
+            "link 5: must be -1 to 1",
+        ),
+    ],
+)
+def test_geometry_that_cannot_be_drawn_is_refused(changes, says):
+    with pytest.raises(GeometryError, match=says):
+        Look(Geometry(**{"a": [0.1, 0.2], "d": [0.0, 0.0], "alpha": [0.0, 0.0], **changes}), UR5E.payload)
+
+
+def test_deflections_of_another_arm_are_refused(moved):
+    look = look_of("one-joint")
+    with pytest.raises(GeometryError, match="6 deflections where the robot's geometry has 2"):
+        look.row(moved.states[0], moved.truths[0])
+
+
+def test_arm_without_truth_is_stiff_and_old_truth_has_no_static_part(moved):
+    look, state, truth = look_of("ur5e"), moved.states[100], moved.truths[100]
+    assert look.row(state, None) == [*state.actual_q, *state.reference_q, *[0.0] * 20]
+    old = look.row(state, replace(truth, static_gear_deflection=[], static_link_deflection=[]))
+    assert old[12:18] == [0.0] * 6
+    assert old[18:24] == truth.gear_deflection
+
+
+def test_bodies_of_a_world_are_nan_while_unknown(moved):
+    look, state, truth = look_of("ur5e"), moved.states[100], moved.truths[100]
+    there = Look(replace(look.geometry, world=World(name="table", bodies=["box"], shapes=[])), look.payload)
+    pose = [-0.4, 0.1, 0.2, 0.0, 0.0, 0.3]
+    assert there.row(state, replace(truth, body_poses=pose)) == [*look.row(state, truth), *pose]
+    for row in (there.row(state, None), there.row(state, truth)):
+        assert len(row) == len(look.row(state, truth)) + 6
+        assert np.isnan(row[-6:]).all()
 
 
 @pytest.fixture(scope="module")
@@ -44,37 +85,32 @@ def chromium(moved):  # whose event loop playwright would not suffer beside its 
         yield started
 
 
-@pytest.fixture(scope="module")
-def opened(chromium, tmp_path_factory):
-    """Opens a page that plays tracks back."""
-    folder, numbers = tmp_path_factory.mktemp("pages"), itertools.count()
-
-    def open_page(*tracks):
-        file = folder / f"{next(numbers)}.html"
-        file.write_text(playback(tracks, "test", factor=100.0), encoding="utf-8")
-        tab = chromium.new_page(viewport={"width": 250, "height": 250})
-        failed = []
-        tab.on("pageerror", lambda error: failed.append(str(error)))
-        tab.set_default_timeout(PATIENCE * 1000.0)
-        tab.goto(file.as_uri())
-        tab.wait_for_function("tvist.shown !== undefined")
-        assert not failed
-        return tab
-
-    return open_page
-
-
-@pytest.fixture(scope="module")
-def tab(opened, moved):
-    """A page of the UR5e in motion and of another arm, which pauses: drawing takes a processor."""
-    ur5e, seven = (look_of(name) for name in ("ur5e", SEVEN))
-    page = opened(Track("x", ur5e, moved.states, moved.truths), Track("y", seven, standing(moved, seven), []))
-    page.evaluate("tvist.toggle()")
+def undrawn(chromium):
+    """Return a small page that draws only when a test asks for it: drawing takes a processor."""
+    page = chromium.new_page(viewport={"width": 200, "height": 200})
+    page.set_default_timeout(PATIENCE * 1000.0)
+    page.add_init_script("requestAnimationFrame = () => 0")
     return page
 
 
+@pytest.fixture(scope="module")
+def tab(chromium, moved, tmp_path_factory):
+    """A page with all arms at the start of their motions."""
+    first, *others = map(look_of, ARMS)
+    tracks = [Track("moves", first, moved.states, moved.truths)]
+    tracks += [Track("rests", look, standing(moved, look), []) for look in others]
+    file = tmp_path_factory.mktemp("pages") / "arms.html"
+    file.write_text(playback(tracks, "test", factor=100.0), encoding="utf-8")
+    tab, failed = undrawn(chromium), []
+    tab.on("pageerror", lambda error: failed.append(str(error)))
+    tab.goto(file.as_uri())
+    tab.evaluate("tvist.draw(0)")
+    assert not failed
+    return tab
+
+
 def flanges(tab, angles, bends, track=0):
-    """Poses of the flange that the page computes, shape (count, 4, 4)."""
+    """Return poses of the flange as the page computes them, shape (count, 4, 4)."""
     found = tab.evaluate(
         "([all, bends, track]) => { const { chain } = tvist.tracks[track].robot.arm;"
         " return all.map((q, i) => chain.frames(q, bends[i]).at(-1).elements); }",
@@ -136,112 +172,58 @@ def test_page_interpolates_between_two_rows(tab, moved):
 
 
 @pytest.mark.parametrize("name", ARMS)
-def test_every_arm_is_connected_and_fills_the_picture(opened, moved, name):
+def test_every_arm_is_connected(tab, name):
     look = look_of(name)
-    tab = opened(Track("x", look, standing(moved, look), []))
     found = tab.evaluate(
-        "() => { const { arm } = tvist.tracks[0].robot; const [a, b] = [tvist.stage.scene.filled(), arm.outline()];"
-        " return { ...a, points: b.map((p) => p.toArray()), parts: arm.frames.map((f) => f.children.length) }; }"
+        "(track) => { const { at, robot: { arm } } = tvist.tracks[track];"
+        " const points = arm.outline().map((p) => p.toArray().map((value, k) => value - at[k]));"
+        " return { points, parts: arm.frames.map((f) => f.children.length) }; }",
+        ARMS.index(name),
     )
-    tab.close()
     points = np.array(found["points"])
     assert np.isfinite(points).all()
     assert np.linalg.norm(points, axis=1).max() < 1.8 * look.reach + 0.3
     assert points[:, 2].min() > -0.8 * look.reach
-    assert max(np.diff(found["x"])[0], np.diff(found["y"])[0]) > 2 * 0.6
-    assert all(-1.05 < edge < 1.05 for key in "xy" for edge in found[key])
     assert sum(found["parts"]) >= 2 * look.joints
 
 
-def test_meshes_of_a_urdf_replace_the_drawn_links(chromium, moved, tmp_path):
+def test_arms_fill_the_picture(tab):
+    """Two by themselves, and all together."""
+    for shown in ([0], [1], [0, 1, 2]):
+        seen = tab.evaluate(
+            "(shown) => { const { scene } = tvist.stage;"
+            " tvist.tracks.forEach(({ robot }, k) => (robot.arm.root.visible = shown.includes(k)));"
+            " const arms = tvist.tracks.filter((_, k) => shown.includes(k)).map(({ robot }) => robot.arm);"
+            " scene.keep(arms.flatMap((arm) => arm.outline()));"
+            " scene.invalidate(); scene.draw(); return scene.filled(); }",
+            shown,
+        )
+        assert max(np.diff(seen["x"])[0], np.diff(seen["y"])[0]) > 2 * 0.6
+        assert all(-1.05 < edge < 1.05 for key in "xy" for edge in seen[key])
+
+
+def test_meshes_of_a_urdf_replace_the_drawn_links(chromium, moved):
     corners = [(0, 0, 0), (0.1, 0, 0), (0, 0.1, 0.3)]
     facet = struct.pack("<12fH", *(0, 0, 1), *(value for corner in corners for value in corner), 0)
-    for number in range(2):
-        (tmp_path / f"part{number}.stl").write_bytes(bytes(80) + struct.pack("<I", 1) + facet)
-    meshes = [
-        Mesh(link=link, file=str(tmp_path / f"part{number}.stl"), placement=(0.0, 0.0, 0.1, 0.0, 0.0, 0.0))
-        for number, link in enumerate((-1, 2))
-    ]
+    stl, placement = bytes(80) + struct.pack("<I", 1) + facet, (0.0, 0.0, 0.1, 0.0, 0.0, 0.0)
+    meshes = [Mesh(link=link, file="part.stl", placement=placement) for link in (-1, 2)]
     look = look_of("ur5e")
     look = Look(replace(look.geometry, meshes=meshes), look.payload)
     packed = Track("x", look, standing(moved, look), []).packed(0.0)
     packed["look"]["meshes"] = ["/mesh/0.stl", "/mesh/1.stl"]
-    text = page({"kind": "playback", "title": "x", "factor": 1, "tracks": [packed]})
-    files = {f"/mesh/{number}.stl": (tmp_path / f"part{number}.stl").read_bytes() for number in range(2)}
-    counted = _in_browser(chromium, text, files)
+    files = dict.fromkeys(packed["look"]["meshes"], stl)
+    files["/"] = page({"kind": "playback", "title": "x", "factor": 1, "tracks": [packed]})
+    tab = undrawn(chromium)
+    tab.route("**/*", lambda route: route.fulfill(body=files[urlsplit(route.request.url).path]))
+    tab.goto("http://tvist.test/")
+    tab.wait_for_function(
+        "tvist.tracks?.[0].robot.arm.frames.flatMap((f) => f.children).filter((c) => c.userData.mesh).length === 2",
+        polling=20,
+    )
+    counted = tab.evaluate(
+        "() => { const all = tvist.tracks[0].robot.arm.frames.flatMap((f) => f.children);"
+        " const meshes = all.filter((c) => c.userData.mesh).length;"
+        " return { meshes, others: all.length - meshes }; }"
+    )
+    tab.close()
     assert counted == {"meshes": 2, "others": 1}  # the payload stays
-
-
-def _in_browser(chromium, text, files):
-    """Parts of the arm that a served page has drawn in the end."""
-    ready, done, urls = threading.Event(), threading.Event(), []
-
-    async def serve():
-        async def meet(tab):
-            async for _ in tab:
-                pass
-
-        async with open_stage(text, meet, "127.0.0.1", 0, parts=files.get) as url:
-            urls.append(url)
-            ready.set()
-            await asyncio.to_thread(done.wait)
-
-    thread = threading.Thread(target=asyncio.run, args=(serve(),))
-    thread.start()
-    try:
-        assert ready.wait(30)
-        tab = chromium.new_page()
-        tab.set_default_timeout(PATIENCE * 1000.0)
-        tab.goto(urls[0])
-        tab.wait_for_function(
-            "tvist.tracks?.[0].robot.arm.frames.flatMap((f) => f.children).filter((c) => c.userData.mesh).length === 2"
-        )
-        counted = tab.evaluate(
-            "() => { const all = tvist.tracks[0].robot.arm.frames.flatMap((f) => f.children);"
-            " const meshes = all.filter((c) => c.userData.mesh).length;"
-            " return { meshes, others: all.length - meshes }; }"
-        )
-        tab.close()
-        return counted
-    finally:
-        done.set()
-        thread.join()
-
-
-@pytest.mark.parametrize(
-    ("changes", "says"),
-    [
-        ({"version": 2}, "version 2"),
-        ({"a": [0.1]}, "different lengths"),
-        ({"a": [], "d": [], "alpha": []}, "no joints"),
-        ({"bending": [2]}, "does not exist"),
-        ({"capsules": [Capsule(name="x", link=5, start=(0, 0, 0), end=(0, 0, 1), radius=0.1)]}, "not exist"),
-    ],
-)
-def test_geometry_that_cannot_be_drawn_is_refused(changes, says):
-    with pytest.raises(GeometryError, match=says):
-        Look(Geometry(**{"a": [0.1, 0.2], "d": [0.0, 0.0], "alpha": [0.0, 0.0], **changes}), UR5E.payload)
-
-
-def test_deflections_of_another_arm_are_refused(moved):
-    look = look_of("one-joint")
-    with pytest.raises(GeometryError, match="6 deflections where the robot's geometry has 2"):
-        look.row(moved.states[0], moved.truths[0])
-
-
-def test_arm_without_truth_is_stiff_and_old_truth_has_no_static_part(moved):
-    look, state, truth = look_of("ur5e"), moved.states[100], moved.truths[100]
-    assert look.row(state, None) == [*state.actual_q, *state.reference_q, *[0.0] * 20]
-    old = look.row(state, replace(truth, static_gear_deflection=[], static_link_deflection=[]))
-    assert old[12:18] == [0.0] * 6
-    assert old[18:24] == truth.gear_deflection
-
-
-def test_bodies_of_a_world_are_nan_while_unknown(moved):
-    look, state, truth = look_of("ur5e"), moved.states[100], moved.truths[100]
-    there = Look(replace(look.geometry, world=World(name="table", bodies=["box"], shapes=[])), look.payload)
-    pose = [-0.4, 0.1, 0.2, 0.0, 0.0, 0.3]
-    assert there.row(state, replace(truth, body_poses=pose)) == [*look.row(state, truth), *pose]
-    for row in (there.row(state, None), there.row(state, truth)):
-        assert len(row) == len(look.row(state, truth)) + 6
-        assert np.isnan(row[-6:]).all()

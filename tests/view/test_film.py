@@ -1,4 +1,4 @@
-"""Films: which pictures there are, and that a browser draws them."""
+"""Films: the times of their frames, and that a browser draws them."""
 
 import numpy as np
 import pytest

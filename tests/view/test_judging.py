@@ -1,4 +1,4 @@
-"""What the page says of a motion without and with a shaper, when the network has lost something."""
+"""The verdict on a motion without and with a shaper if the network has lost messages."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What tabs of the live page ask costs the robots little, and ends with the tab."""
+"""Requests of the live page's tabs occupy few robots, and end when the tab closes."""
 
 import asyncio
 import json
@@ -11,7 +11,7 @@ from tvist_view import live, shown_robot
 
 
 class Tab:
-    """A tab that asks for what a test puts into its queue; None: it closes."""
+    """A tab that sends what a test puts into its queue; None closes it."""
 
     number = 1
 

@@ -16,9 +16,11 @@ from .browser import Page, browser
 pytestmark = pytest.mark.realtime
 
 STOPPED = 1
+FIRST, SECOND = "ur5e-1", "ur5e-2"
+SMALL = {"width": 400, "height": 400}  # window: drawing takes a processor
 MS = PATIENCE * 1000.0
 """How long the page may take to show something [ms]: its graphics are computed, beside the other tests."""
-SIZES = {"wide": (1280, 800), "phone": (390, 844)}
+SIZES = {"wide": {"width": 1280, "height": 800}, "phone": {"width": 390, "height": 844}}
 HIGH = """() => { const seen = tvist.stage.scene.filled(); return seen && (seen.y[1] - seen.y[0]) / 2; }"""
 """Share of the scene's height that the arm takes, by the page's own projection."""
 
@@ -31,19 +33,19 @@ def chromium():
 
 @pytest.fixture(scope="module")
 def served():
-    with Served() as robot:
-        yield robot
+    with Served("--robots", "ur5e*2", name=None) as robots:
+        yield robots
 
 
 @pytest.fixture(scope="module")
 def view(served):
-    with Page(served.endpoint) as page:
+    with Page(served.endpoint, "--name", FIRST) as page:
         yield page
 
 
 @pytest.fixture(scope="module")
 def tab(chromium, view):
-    page = chromium.new_page(viewport={"width": 500, "height": 400})
+    page = chromium.new_page(viewport=SMALL)
     page.set_default_timeout(MS)
     page.asked = []
     page.on("request", lambda request: page.asked.append(request.url))
@@ -55,9 +57,16 @@ def tab(chromium, view):
 
 @pytest.fixture
 def wire(served):
-    with Wire(served.endpoint) as wire:
+    with Wire(served.endpoint, FIRST) as wire:
         wire.listen("state", "event")
         yield wire
+
+
+def opened(chromium, view, **options):
+    page = chromium.new_page(**({"viewport": SMALL} | options))
+    page.set_default_timeout(MS)
+    page.goto(view.url)
+    return page
 
 
 def take(tab):
@@ -65,13 +74,14 @@ def take(tab):
     tab.get_by_text("This tab has control.").wait_for()
 
 
-def moving(wire, *, since=0):
-    return wire.wait("state", lambda state: max(map(abs, state["target_qd"])) > 0.05, since=since)
+def moving(wire):
+    wire.wait("state", lambda state: max(map(abs, state["target_qd"])) > 0.05)
 
 
 def jog(tab, sign, wire):
     take(tab)
-    tab.get_by_role("button", name="more").click()
+    if tab.locator("#more").is_hidden():
+        tab.get_by_role("button", name="more").click()
     button = tab.get_by_role("button", name=f"{sign} hold to jog")
     button.scroll_into_view_if_needed()
     button.hover()
@@ -80,7 +90,7 @@ def jog(tab, sign, wire):
 
 
 def silence(wire, stopped):
-    """From the last set-point that was played to the stop [s]: ticks, since a browser may take its time."""
+    """Return the time from the last played set-point to the stop [s], in ticks, since browsers may be slow."""
     played = [state for state in wire.received["state"] if state["setpoint_sequence"] is not None]
     newest = max(state["setpoint_sequence"] for state in played)
     last = min(state["tick"] for state in played if state["setpoint_sequence"] == newest)
@@ -112,30 +122,17 @@ def test_page_draws_the_robot_without_other_requests(tab, view):
     assert all(url.startswith((view.url, "data:", "blob:")) for url in tab.asked), tab.asked
 
 
-def test_motion_of_the_page_moves_the_arm(tab, wire, served):
+def test_motion_of_the_page_moves_the_arm(tab, wire):
     take(tab)
     assert wire.info()["control"].startswith("view-")
-    tab.get_by_role("button", name="stretched → folded").click()
+    tab.get_by_role("button", name="front → left").click()
     moving(wire)
-    target = wire.info()["poses"]["Q3"]
+    target = wire.info()["poses"]["Q2"]
     wire.wait(
         "state", lambda state: max(abs(a - b) for a, b in zip(state["target_q"], target, strict=True)) < 1e-9
     )
     tab.get_by_role("button", name="Give back control").click()
     tab.get_by_text("Nobody has control.").wait_for()
-    while wire.info()["control"] is not None:
-        pass
-
-
-def test_closing_the_tab_in_a_jog_stops_the_arm_within_260_ms(chromium, view, wire):
-    page = chromium.new_page(viewport={"width": 500, "height": 400})
-    page.set_default_timeout(MS)
-    page.goto(view.url)
-    jog(page, "+", wire)
-    page.close()
-    stopped = wire.wait("event", lambda event: event["kind"] == "stream_stopped")
-    assert silence(wire, stopped) <= 0.26
-    wire.wait("state", lambda state: state["tick"] > stopped["tick"] and state["runtime_state"] == STOPPED)
     while wire.info()["control"] is not None:
         pass
 
@@ -149,15 +146,29 @@ def test_releasing_the_jog_button_stops_the_arm(tab, wire):
     tab.get_by_text("Nobody has control.").wait_for()
 
 
+def test_one_of_several_robots_can_be_selected(tab):
+    for name in (SECOND, FIRST):
+        tab.get_by_role("combobox", name="robot").select_option(name)
+        tab.wait_for_function(f"tvist.info.name === '{name}' && tvist.last")
+
+
+def test_closing_the_tab_in_a_jog_stops_the_arm_within_260_ms(tab, wire):
+    """The last test of this tab."""
+    jog(tab, "+", wire)
+    tab.close()
+    stopped = wire.wait("event", lambda event: event["kind"] == "stream_stopped")
+    assert silence(wire, stopped) <= 0.26
+    wire.wait("state", lambda state: state["tick"] > stopped["tick"] and state["runtime_state"] == STOPPED)
+    while wire.info()["control"] is not None:
+        pass
+
+
 @pytest.mark.nightly
 def test_tab_without_control_watches_and_may_stop(chromium):
     """The robot is in slow motion, since software draws two pages slowly."""
     with Served("--speed", "0.1") as robot, Page(robot.endpoint) as view, Wire(robot.endpoint) as wire:
         wire.listen("state", "event")
-        tab, other = (chromium.new_page(viewport={"width": 500, "height": 400}) for _ in range(2))
-        for page in (tab, other):
-            page.set_default_timeout(MS)
-            page.goto(view.url)
+        tab, other = (opened(chromium, view) for _ in range(2))
         take(tab)
         other.get_by_text("Another tab has control").wait_for()
         assert other.get_by_role("button", name="front → left").is_disabled()
@@ -172,9 +183,9 @@ def test_tab_without_control_watches_and_may_stop(chromium):
 
 
 def in_sight(page):
-    """State, STOP, a plot and what says how much bending is magnified are inside the window, and the arm is large."""
-    page.get_by_text("RUNNING, NORMAL").wait_for(timeout=MS)
-    page.wait_for_function(f"({HIGH})() > 0", timeout=MS)
+    """Check that state, STOP, a plot and the magnification are inside the window, and that the arm is large."""
+    page.get_by_text("RUNNING, NORMAL").wait_for()
+    page.wait_for_function(f"({HIGH})() > 0")
     size = page.viewport_size
     bar = page.locator("#bar")
     for what in (
@@ -194,11 +205,9 @@ def in_sight(page):
 @pytest.mark.nightly
 @pytest.mark.parametrize("name", SIZES)
 def test_first_screen_shows_arm_state_stop_and_plot(chromium, view, name):
-    width, height = SIZES[name]
-    page = chromium.new_page(viewport={"width": width, "height": height}, color_scheme="dark")
-    page.goto(view.url)
+    page = opened(chromium, view, viewport=SIZES[name], color_scheme="dark")
     in_sight(page)
-    picture = Image.open(io.BytesIO(page.locator("#scene canvas").screenshot(timeout=MS))).convert("L")
+    picture = Image.open(io.BytesIO(page.locator("#scene canvas").screenshot())).convert("L")
     bright = np.flatnonzero((np.asarray(picture) > 140).sum(axis=1) > 2)  # on the dark ground only the arm is
     assert np.ptp(bright) > 0.3 * picture.height
     page.close()
@@ -212,9 +221,7 @@ def test_comparison_on_the_page_agrees_with_log_analyze(tmp_path, chromium):
         Page(robot.endpoint) as view,
         Wire(robot.endpoint) as wire,
     ):
-        page = chromium.new_page(viewport={"width": 500, "height": 400})
-        page.set_default_timeout(MS)
-        page.goto(view.url)
+        page = opened(chromium, view)
         page.get_by_role("button", name="A/B").click()
         card = page.locator(".card")
         card.get_by_text("vibration").wait_for()
@@ -229,29 +236,18 @@ def test_comparison_on_the_page_agrees_with_log_analyze(tmp_path, chromium):
     assert less == pytest.approx(100.0 * (1.0 - after / before), abs=1.0)
 
 
-def test_one_of_several_robots_can_be_selected(chromium):
-    with Served("--robots", "ur5e*2", name=None) as robots, Page(robots.endpoint, "--name", "ur5e-1") as view:
-        page = chromium.new_page(viewport={"width": 500, "height": 400})
-        page.set_default_timeout(MS)
-        page.goto(view.url)
-        page.get_by_text("RUNNING, NORMAL").wait_for()
-        page.get_by_role("combobox", name="robot").select_option("ur5e-2")
-        page.wait_for_function("tvist.info.name === 'ur5e-2' && tvist.last")
-        page.close()
-
-
 @pytest.mark.nightly
 def test_page_and_terminal_wait_for_a_missing_robot(chromium):
     endpoint = free_endpoint()
     with Page(endpoint) as view:
-        view.said("no server answers.*waiting for the robot")
-        page = chromium.new_page(viewport={"width": 1280, "height": 800})
-        page.goto(view.url)
-        page.get_by_text("No robot.").wait_for(timeout=MS)
+        view.wait_until_said("waiting for the robot")
+        assert "no server answers" in view.said
+        page = opened(chromium, view, viewport=SIZES["wide"])
+        page.get_by_text("No robot.").wait_for()
         for _ in range(2):  # what comes back looks as it did at first
             with Served("--name", "ur5e", name=None, endpoint=endpoint):
                 in_sight(page)
-            page.get_by_text("The robot has gone.").wait_for(timeout=MS)
+            page.get_by_text("The robot has gone.").wait_for()
         page.close()
         view.process.send_signal(signal.SIGINT)
         assert view.process.wait(PATIENCE) == 130

@@ -1,4 +1,4 @@
-"""Signals for plots: against the laboratory's own figures, and whatever the order of messages."""
+"""Signals for plots equal those of the laboratory, for messages in any order."""
 
 import numpy as np
 import pinocchio as pin

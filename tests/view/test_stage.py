@@ -1,4 +1,4 @@
-"""The page's door: other sites in a browser on this machine are turned away."""
+"""The page's server refuses other sites that a browser on this machine has open."""
 
 import asyncio
 import urllib.error
@@ -72,7 +72,7 @@ async def test_other_machines_are_served_only_with_insecure():
 
 async def test_port_in_use_is_refused_with_advice():
     async with opened() as url:
-        with pytest.raises(StageError, match="Another port: --port"):
+        with pytest.raises(StageError, match="Give another port, such as --port"):
             async with open_stage("", _echo, "127.0.0.1", int(url.rpartition(":")[2])):
                 pass
 

@@ -1,7 +1,6 @@
-"""The page for trying shaping, as it is shipped: its numbers are the packages', and it shows what its address says."""
+"""The interactive shaping page as shipped: it computes the packages' numbers, and its address holds its state."""
 
 import json
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +14,7 @@ ROOT = Path(__file__).parents[2]
 FILE = ROOT / "view" / "tvist_view" / "try.html"
 SOURCES = ROOT / "view" / "page" / "try"
 PATIENCE_MS = 60_000.0
+PHONE, LAPTOP = {"width": 390, "height": 844}, {"width": 1280, "height": 800}
 
 
 @pytest.fixture(scope="module")
@@ -23,45 +23,34 @@ def chromium():
         yield started
 
 
-@contextmanager
-def pages(chromium):
-    """Opens pages of a state and a size, in which nothing may fail."""
-    opened, errors = [], []
-
-    def at(state="", width=1280, height=800):
-        page = chromium.new_context(viewport={"width": width, "height": height}, offline=True).new_page()
-        page.set_default_timeout(PATIENCE_MS)
-        page.on("pageerror", lambda error: errors.append(str(error)))
-        page.goto(f"{FILE.as_uri()}{state}")
-        opened.append(page)
-        return page
-
-    yield at
-    for page in opened:
-        page.context.close()
+@pytest.fixture(scope="module")
+def page(chromium):
+    """The page, offline; fails at the end if it has reported an error."""
+    errors = []
+    page = chromium.new_context(viewport=PHONE, offline=True).new_page()
+    page.set_default_timeout(PATIENCE_MS)
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    show(page, "")
+    press(page, "pause")
+    yield page
+    page.context.close()
     assert not errors
 
 
 @pytest.fixture
-def opened(chromium):
-    with pages(chromium) as at:
-        yield at
+def own(page):
+    """The page's scene in which users type a shaper of their own."""
+    show(page, "#scene=own&z=0")
+    return page
 
 
-@pytest.fixture(scope="module")
-def own(chromium):
-    """A page for an own shaper."""
-    with pages(chromium) as at:
-        yield at("#scene=own&z=0")
+def show(page, state):
+    page.goto(f"{FILE.as_uri()}{state}")
 
 
-@pytest.fixture(scope="module")
-def numbers(chromium):
-    page = chromium.new_page(viewport={"width": 200, "height": 200})
-    page.goto(FILE.as_uri())
-    page.get_by_role("button", name="pause").click()
-    yield page
-    page.close()
+def press(page, name):
+    """Press a button without waiting for pictures, which take a processor."""
+    page.get_by_role("button", name=name).dispatch_event("click")
 
 
 def close(found, wanted, most=1e-9):
@@ -69,29 +58,29 @@ def close(found, wanted, most=1e-9):
     assert np.abs(np.array(found) - np.array(wanted)).max() <= most
 
 
-def test_page_has_every_catalogued_shaper(numbers):
-    assert numbers.evaluate("tried.missing") == []
-    assert numbers.evaluate("Object.keys(tried.SHAPERS)") == list(SHAPERS)
+def test_page_has_every_catalogued_shaper(page):
+    assert page.evaluate("tried.missing") == []
+    assert page.evaluate("Object.keys(tried.SHAPERS)") == list(SHAPERS)
 
 
 @pytest.mark.parametrize("name", SHAPERS)
-def test_shapers_of_the_page_match_the_library(numbers, name):
+def test_shapers_of_the_page_match_the_library(page, name):
     for mode in page_numbers.MODES:
         true, wanted = page_numbers.of_shaper(name, *mode)
-        found = numbers.evaluate(
+        found = page.evaluate(
             """([name, [f_d, zeta], f]) => { const made = tried.SHAPERS[name](f_d, zeta);
             return { ...made, residual: f.map((one) => tried.residual(one, zeta, made)) }; }""",
             [name, mode, true],
         )
         for key, values in wanted.items():
             close(found[key], values)
-    found = numbers.evaluate("(name) => tried.band(tried.SHAPERS[name](1, 0), 1, 0, 0.05)", name)
+    found = page.evaluate("(name) => tried.band(tried.SHAPERS[name](1, 0), 1, 0, 0.05)", name)
     assert found == pytest.approx(SHAPERS[name].band(0.05), abs=1e-9, nan_ok=True)
 
 
-def test_filter_of_the_page_matches_the_library(numbers):
+def test_filter_of_the_page_matches_the_library(page):
     samples, wanted = page_numbers.filtered()
-    found = numbers.evaluate(
+    found = page.evaluate(
         """(samples) => { const mode = tried.following(tried.parameters);
         const one = new tried.Filter(tried.SHAPERS.zvd, mode, [0.1, 2.5], 0.002);
         return samples.map((sample) => one.filter(sample)); }""",
@@ -100,8 +89,8 @@ def test_filter_of_the_page_matches_the_library(numbers):
     close(found, wanted)
 
 
-def test_mass_of_the_page_matches_a_linear_simulation(numbers):
-    found = numbers.evaluate(
+def test_mass_of_the_page_matches_a_linear_simulation(page):
+    found = page.evaluate(
         "([mode, believed]) => tried.swing(...mode, tried.SHAPERS.zv(...believed))", page_numbers.SWING
     )
     for key, wanted in page_numbers.swung().items():
@@ -109,9 +98,9 @@ def test_mass_of_the_page_matches_a_linear_simulation(numbers):
 
 
 @pytest.mark.parametrize("motion", page_numbers.MOTIONS, ids=lambda one: f"{one[0]} {one[1]}")
-def test_motion_of_the_page_matches_the_simulated_arm(numbers, motion):
+def test_motion_of_the_page_matches_the_simulated_arm(page, motion):
     wanted = page_numbers.moved(*motion)
-    found = numbers.evaluate(
+    found = page.evaluate(
         """([shaper, estimator, start, target]) => { const arm = tried.parameters;
         const mode = estimator === "following" ? tried.following(arm) : tried.fixed(...tried.modeOf(arm, Math.PI / 2));
         return tried.run(arm, start, target, tried.SHAPERS[shaper], mode, 500).link; }""",
@@ -120,31 +109,33 @@ def test_motion_of_the_page_matches_the_simulated_arm(numbers, motion):
     close(found[: len(wanted)], wanted)
 
 
-def test_every_scene_opens_offline_and_fits_the_window(opened):
-    page = opened("#scene=ur5e")
-    for width, height in (1280, 800), (390, 844):
-        page.set_viewport_size({"width": width, "height": height})
+def test_every_scene_opens_offline_and_fits_the_window(page):
+    for size, button in (PHONE, "play"), (LAPTOP, "pause"):  # the small pictures are drawn, too
+        page.set_viewport_size(size)
+        press(page, button)
         for scene in ("ur5e", "mass", "arm", "own"):
-            page.goto(f"{FILE.as_uri()}#scene={scene}")
+            show(page, f"#scene={scene}")
             page.locator(f"body[data-scene={scene}]").get_by_text("is left").first.wait_for()
-            assert page.evaluate("document.documentElement.scrollWidth") <= width
+            assert page.evaluate("document.documentElement.scrollWidth") <= size["width"]
             box = page.locator("#stage").bounding_box()
-            assert box["y"] + box["height"] <= height
+            assert box["y"] + box["height"] <= size["height"]
     assert FILE.stat().st_size <= 1.5e6
 
 
-def test_address_and_sliders_stay_in_step(opened):
-    page = opened("#scene=mass&e=20")
+def test_address_and_sliders_stay_in_step(page):
+    show(page, "#scene=mass&e=20")
     left = page.locator("#large").inner_text()
     page.get_by_role("slider", name="model error").press("Home")
     assert "e=-50" in page.url
-    assert page.locator("#large").inner_text() != left
-    again = opened(page.url.partition("try.html")[2])
-    assert again.locator("#large").inner_text() == page.locator("#large").inner_text()
+    shown = page.locator("#large").inner_text()
+    assert shown != left
+    page.reload()
+    press(page, "pause")
+    assert page.locator("#large").inner_text() == shown
 
 
-def test_unknown_parts_of_a_link_are_listed(opened):
-    page = opened("#scene=mass&f=900&s=nothing&toString=1&__proto__=1")
+def test_unknown_parts_of_a_link_are_listed(page):
+    show(page, "#scene=mass&f=900&s=nothing&toString=1&__proto__=1")
     assert "f=900, s=nothing, toString=1, __proto__=1" in page.get_by_role("alert").first.inner_text()
 
 

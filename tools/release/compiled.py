@@ -1,14 +1,14 @@
-"""`python -m tools.release.compiled DIST PYTHON...`: add wheels of `tvist-compiled` to built packages.
+"""Add wheels of `tvist-compiled` to built packages.
 
 Each holds the kernels of a served robot as machine code for one Python and one architecture. They run on any
 processor of the architecture, but only with the versions of numba and llvmlite that the wheel requires.
 """
 
+import argparse
 import base64
 import hashlib
 import json
 import platform
-import sys
 import tempfile
 import zipfile
 from pathlib import Path
@@ -82,12 +82,16 @@ def _digest(data: bytes) -> str:
     return "sha256=" + base64.urlsafe_b64encode(hashlib.sha256(data).digest()).decode().rstrip("=")
 
 
-def main(dist: str, *pythons: str) -> None:
-    """Make a wheel for each Python."""
-    for python in pythons:
-        wheel = compiled_wheel(Path(dist).resolve(), python)
+def main() -> None:
+    """Make a wheel for each Python that the command line names."""
+    parser = argparse.ArgumentParser(prog="python -m tools.release.compiled", description=__doc__)
+    parser.add_argument("dist", type=Path, help="Folder of the built packages, which gets the wheels.")
+    parser.add_argument("pythons", nargs="+", help="Programs of Python, such as python3.12.")
+    given = parser.parse_args()
+    for python in given.pythons:
+        wheel = compiled_wheel(given.dist.resolve(), python)
         print(f"{wheel.name}: {wheel.stat().st_size / 1e6:.1f} MB", flush=True)
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    main()

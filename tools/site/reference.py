@@ -58,19 +58,18 @@ def modules() -> list[Module]:
         root = package.parent.parent
         if package.parent.name in PROGRAMS:
             continue
-        public = [
-            path
+        texts = {
+            path: path.read_text(encoding="utf-8")
             for path in package.parent.rglob("*.py")
             if path.stem == "__init__" or not path.stem.startswith("_")
-        ]
-        parsed = {path: ast.parse(path.read_text(encoding="utf-8")) for path in public}
-        exporting = {path: exports for path, tree in parsed.items() if (exports := _exports(tree))}
-        for path in exporting or parsed:
+        }
+        for path in [path for path, text in texts.items() if "\n__all__ = " in text] or texts:
             parts = path.relative_to(root).with_suffix("").parts
             name = ".".join(part for part in parts if part != "__init__")
-            about = (ast.get_docstring(parsed[path]) or "").partition("\n")[0].rstrip(".")
-            exports = exporting.get(path, set())
-            split = _origins(parsed[path], exports) if len(exports) > MANY else {}
+            tree = ast.parse(texts[path])
+            about = (ast.get_docstring(tree) or "").partition("\n")[0].rstrip(".")
+            exports = _exports(tree)
+            split = _origins(tree, exports) if len(exports) > MANY else {}
             found.append(Module(name, root, about, split))
     return sorted(found, key=lambda module: module.name)
 

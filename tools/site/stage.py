@@ -19,12 +19,7 @@ TRY = ROOT / "view" / "tvist_view" / "try.html"
 FRAME = '<iframe class="try" src="try.html" title="Try shaping"></iframe>\n\n'
 """The interactive shaping page, which the site's front page shows above its picture."""
 PICTURE = "<picture>"
-PICTURES = {
-    ".png",
-    ".gif",
-    ".svg",
-    ".webp",
-}  # suffixes of files that a browser shows by itself; they are copied
+PICTURES = {".png", ".gif", ".svg", ".webp"}  # suffixes of files that a browser shows
 REPOSITORY = os.environ.get("TVIST_REPOSITORY", "")
 """Address of the repository for links to its files; without it they become plain text."""
 
@@ -58,6 +53,7 @@ def stage(folder: Path) -> Path:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     configuration = {
         "copyright": f"tvist {project['version']}, {project['license']}",
+        **({"repo_url": REPOSITORY} if REPOSITORY else {}),
         "INHERIT": str(Path(__file__).with_name("mkdocs.yml")),
         "docs_dir": str(to),
         "site_dir": str(folder / "html"),
@@ -75,8 +71,6 @@ def stage(folder: Path) -> Path:
             }
         },
     }
-    if REPOSITORY:
-        configuration["repo_url"] = REPOSITORY
     path = folder / "mkdocs.yml"
     _write(path, json.dumps(configuration, indent=2))  # JSON is YAML
     return path

@@ -12,10 +12,6 @@ class Asked(Struct, tag_field="do", frozen=True, forbid_unknown_fields=True):
     """A message of a tab."""
 
 
-class Setting(Asked, frozen=True):
-    """A message that changes a setting; it is also accepted while the arm moves."""
-
-
 class Seen(Asked, tag="seen", frozen=True):
     """The tab has drawn the last frame and is ready for the next one."""
 
@@ -60,38 +56,38 @@ class Jog(Asked, tag="jog", frozen=True):
     direction: Annotated[float, Meta(ge=-1.0, le=1.0)]
 
 
-class Shape(Setting, tag="shape", frozen=True):
-    """Choose the shaper, and how many modes it suppresses; None keeps the number."""
+class Shape(Asked, tag="shape", frozen=True):
+    """Choose the shaper, also in motion, and its number of modes, which None keeps."""
 
     shaper: str
     modes: Annotated[int, Meta(ge=1)] | None = None
 
 
-class Speed(Setting, tag="speed", frozen=True):
-    """Set the speed slider."""
+class Speed(Asked, tag="speed", frozen=True):
+    """Set the speed slider, also in motion."""
 
     fraction: Annotated[float, Meta(ge=0.0, le=1.0)]
 
 
-class Declare(Setting, tag="declare", frozen=True):
-    """Declare a payload mass [kg]."""
+class Declare(Asked, tag="declare", frozen=True):
+    """Declare a payload mass, also in motion [kg]."""
 
     mass: Mass
 
 
 class Carry(Asked, tag="carry", frozen=True):
-    """Let the simulated arm carry a mass [kg]."""
+    """Let the simulated arm carry a mass; it must be at rest [kg]."""
 
     mass: Mass
 
 
-class Fault(Setting, tag="fault", frozen=True):
+class Fault(Asked, tag="fault", frozen=True):
     """Cause a fault."""
 
     name: str
 
 
-class Ready(Setting, tag="ready", frozen=True):
+class Ready(Asked, tag="ready", frozen=True):
     """Release what a client can release, and switch the power on."""
 
 

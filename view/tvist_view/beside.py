@@ -44,36 +44,27 @@ Judge = Callable[[MotionRecord, MotionRecord], Verdict]  # compares a motion wit
 @contextlib.contextmanager
 def _gathered(robot: Robot) -> Iterator[MotionRecord]:
     run = MotionRecord()
-    ends = (
-        robot.on_state(run.states.append),
-        robot.on_truth(run.truths.append),
-        robot.on_event(run.events.append),
-    )
-    try:
+    with contextlib.ExitStack() as ends:
+        ends.callback(robot.on_state(run.states.append))
+        ends.callback(robot.on_truth(run.truths.append))
+        ends.callback(robot.on_event(run.events.append))
         yield run
-    finally:
-        for end in ends:
-            end()
 
 
 def _curves(look: Look, *runs: MotionRecord) -> dict[str, Any]:
     """|α| of both motions over the time since their starts, and when the reference of the first one stopped."""
     signals = [signals_of(look, run.states, {truth.tick: truth for truth in run.truths}) for run in runs]
     spans = [moves(one) or (one.time[0], one.time[0]) for one in signals]
+    shown = [one.between(begun, one.time[-1]) for one, (begun, _) in zip(signals, spans, strict=True)]
+    grid = np.linspace(0.0, max(one.time[-1] - one.time[0] for one in shown), POINTS)
+    curves = np.zeros((len(shown), POINTS))
+    for curve, one in zip(curves, shown, strict=True):
+        # Take the largest value in each step, so that no peak is lost between two points.
+        steps = np.searchsorted(grid, one.time - one.time[0]).clip(0, POINTS - 1)
+        np.maximum.at(curve, steps, np.nan_to_num(one.alpha))
+    without, shaped = np.round(curves, 4).tolist()
     stop = round(float(spans[0][1] - spans[0][0]), 4)
-    shown = [
-        (one.time - begun, np.nan_to_num(one.alpha)) for one, (begun, _) in zip(signals, spans, strict=True)
-    ]
-    last = max(time[-1] for time, _ in shown)
-    grid = np.linspace(0.0, last, POINTS)
-    # Take the largest value in each step, so that no peak is lost between two points.
-    curves = []
-    for time, alpha in shown:
-        out = np.zeros(POINTS)
-        inside = time >= 0.0
-        np.maximum.at(out, np.searchsorted(grid, time[inside]).clip(0, POINTS - 1), alpha[inside])
-        curves.append(np.round(out, 4).tolist())
-    return {"stop": stop, "time": np.round(grid, 4).tolist(), "without": curves[0], "shaped": curves[1]}
+    return {"stop": stop, "time": np.round(grid, 4).tolist(), "without": without, "shaped": shaped}
 
 
 @dataclass
@@ -102,17 +93,32 @@ class Doer:
                 await self._go(info, tab, message)
             case asked.Carry(mass):
                 pilot.do(tab, lambda arm: carry(arm, mass))
-            case asked.Setting():
-                if not isinstance(message, asked.Shape | asked.Ready) or await pilot.take(tab):
-                    await pilot.set(tab, lambda arm: self._set(arm, info, message))
             case asked.Jog(joint):
-                self.say(f"joint is {joint}: the robot has {len(info.joints)} joints, from 0")
+                self.say(f"joint is {joint}: must be 0 to {len(info.joints) - 1}")
+            case _:
+                await self._change(info, tab, message)
+
+    async def _change(self, info: Info, tab: int, message: asked.Message) -> None:
+        """Change a setting, also while the arm moves."""
+        pilot = self.pilot
+        match message:
+            case asked.Shape(shaper, modes):
+                if await pilot.take(tab):
+                    await pilot.set(tab, lambda arm: arm.set_shaper(shaper, modes=modes or info.modes))
+            case asked.Speed(fraction):
+                await pilot.set(tab, lambda arm: arm.set_speed(fraction))
+            case asked.Declare(mass):
+                await pilot.set(tab, lambda arm: declare(arm, mass))
+            case asked.Fault(name):
+                await pilot.set(tab, lambda arm: arm.inject(name))
+            case asked.Ready():
+                if await pilot.take(tab):
+                    await pilot.set(tab, pilot.make_ready)
 
     async def _go(self, info: Info, tab: int, message: asked.Move | asked.Compare) -> None:
         ends = message.first, message.last
-        unknown = [name for name in ends if name not in info.poses]
-        if unknown:
-            self.say(f"the robot has no pose {unknown[0]}: it has {', '.join(info.poses)}")
+        if unknown := [name for name in ends if name not in info.poses]:
+            self.say(f"the robot has no pose {unknown[0]}: choose one of {', '.join(info.poses)}")
         elif await self.pilot.take(tab):
             if isinstance(message, asked.Move):
                 self.pilot.do(tab, lambda arm: motion(arm, [info.poses[name] for name in ends]))
@@ -142,16 +148,3 @@ class Doer:
             self.comparing = None
             with contextlib.suppress(RefusedError, ClientError, ProtocolError):  # the robot may be gone
                 await arm.set_shaper(info.shaper, modes=info.modes)
-
-    async def _set(self, arm: Arm, info: Info, message: asked.Setting) -> None:
-        match message:
-            case asked.Shape(shaper, modes):
-                await arm.set_shaper(shaper, modes=modes or info.modes)
-            case asked.Speed(fraction):
-                await arm.set_speed(fraction)
-            case asked.Declare(mass):
-                await declare(arm, mass)
-            case asked.Fault(name):
-                await arm.inject(name)
-            case _:
-                await self.pilot.make_ready(arm)

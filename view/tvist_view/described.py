@@ -6,7 +6,7 @@ from tvist_protocol.faults import FAULTS
 from tvist_protocol.info import Info
 from tvist_protocol.io import Io
 from tvist_protocol.modes import RobotMode, SafetyMode
-from tvist_protocol.stream import Event, State
+from tvist_protocol.stream import State
 from tvist_view.look import Look, Meshes
 
 NO_TRUTH = "this robot does not publish how it bends; simulated robots do, for pages on the same machine"
@@ -77,32 +77,22 @@ def _program(io: Io | None) -> str:
 
 
 def _word(kind: type[RobotMode] | type[SafetyMode], number: int) -> str:
-    try:
-        return kind(number).name
-    except ValueError:
-        return str(number)
+    """Return the name of a mode; its number if a newer server sent it."""
+    return kind(number).name if number in set(kind) else str(number)
 
 
 class ObservedArm:
     """What a real robot has done since the page shows it."""
 
     def __init__(self) -> None:
-        self._seen: set[str] = set()
-
-    def hear(self, event: Event) -> None:
-        """Note an event."""
-        self._seen.add("stop" if event.kind in STOPS else event.kind)
-
-    def compared(self) -> None:
-        """Note that a comparison without and with the shaper has been made."""
-        self._seen.add("compared")
+        self.seen: set[str] = set()  # kinds of events, and what else the checklist looks at
 
     def steps(self, info: Info, state: State, io: Io | None) -> list[Step]:
         """Return the checklist of a robot that is watched or moved through its own controller; empty for others."""
         if io is not None and io.program_state == "PLAYING":
-            self._seen.add("program")
+            self.seen.add("program")
         if max(map(abs, state.target_qd)) > MOVES:
-            self._seen.add("moved")
+            self.seen.add("moved")
         runs = state.robot_mode == RobotMode.RUNNING
         well = runs and state.safety_mode in {SafetyMode.NORMAL, SafetyMode.REDUCED}
         if info.watched is not None:
@@ -116,7 +106,7 @@ class ObservedArm:
             (there, f"Connect {info.watched}", "check that it is on and that this machine can reach it"),
             (well, "Release its brakes and stops", "at its teach pendant"),
             (
-                "moved" in self._seen,
+                "moved" in self.seen,
                 "Let it move",
                 "with its own programs; the plot below shows the vibration",
             ),
@@ -125,7 +115,7 @@ class ObservedArm:
         ]
 
     def _moved(self, info: Info, *, well: bool) -> list[Step]:
-        seen, cap = self._seen, max(info.limits.velocity)
+        seen, cap = self.seen, max(info.limits.velocity)
         why = info.stop.why if info.stop is not None else ""
         checked = "model, payload, tool, mounting, remote control, angles and safety are checked"
         by_itself = "stop its program or press its emergency stop, read the reason here, and hold it again"
@@ -138,7 +128,7 @@ class ObservedArm:
                 "take control, check that its path is clear, and press a motion",
             ),
             ("motion_stopped" in seen, "Stop it in a motion", "press STOP"),
-            ("stop" in seen and well, "Stop it at the robot", by_itself),
+            (bool(seen & STOPS) and well, "Stop it at the robot", by_itself),
             ("compared" in seen, "Compare without and with shaping", "press A/B"),
             (
                 "program" in seen,

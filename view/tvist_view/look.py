@@ -36,18 +36,18 @@ class Look:
         geometry = self.geometry
         if geometry.version != GEOMETRY_VERSION:
             raise GeometryError(
-                f"the robot describes its geometry in version {geometry.version}, this program knows version "
-                f"{GEOMETRY_VERSION}: update it"
+                f"geometry is of version {geometry.version}: this program draws version {GEOMETRY_VERSION}, so "
+                "update the older of program and robot"
             )
         if not self.joints:
-            raise GeometryError("the robot's geometry has no joints")
-        if not geometry.placement and not len(geometry.d) == len(geometry.alpha) == self.joints:
-            raise GeometryError("the robot's geometry has lists of different lengths")
-        links = [part.link for part in geometry.capsules] + [mesh.link for mesh in geometry.meshes]
-        if any(not 0 <= link < self.joints for link in geometry.bending) or any(
-            not -1 <= link < self.joints for link in links
-        ):
-            raise GeometryError("the robot's geometry names a link that does not exist")
+            raise GeometryError("geometry has no joints: must be at least one")
+        a, d, alpha = len(geometry.a), len(geometry.d), len(geometry.alpha)
+        if not geometry.placement and not a == d == alpha:
+            raise GeometryError(f"geometry has {a} a, {d} d and {alpha} alpha: must be equally many")
+        parts = [part.link for part in geometry.capsules] + [mesh.link for mesh in geometry.meshes]
+        for least, links in ((0, geometry.bending), (-1, parts)):
+            if wrong := [link for link in links if not least <= link < self.joints]:
+                raise GeometryError(f"geometry names link {wrong[0]}: must be {least} to {self.joints - 1}")
 
     @property
     def joints(self) -> int:
@@ -57,16 +57,14 @@ class Look:
     @property
     def turns(self) -> list[Floats]:
         """Rotation of each link's frame in that of its joint, shape (3, 3)."""
-        if not self.geometry.placement:
-            return [rotation_of(alpha, 0.0, 0.0) for alpha in self.geometry.alpha]
-        return [rotation_of(*angles) for _, _, _, *angles in self.geometry.placement]
+        angles = [row[3:] for row in self.geometry.placement]
+        return [rotation_of(*one) for one in angles or [(alpha, 0.0, 0.0) for alpha in self.geometry.alpha]]
 
     @property
     def reach(self) -> float:
         """Sum of the links' lengths [m]."""
-        if self.geometry.placement:
-            return sum(math.hypot(x, y, z) for x, y, z, *_ in self.geometry.placement)
-        return sum(map(math.hypot, self.geometry.a, self.geometry.d))
+        offsets = [row[:3] for row in self.geometry.placement]
+        return sum(math.hypot(*one) for one in offsets or zip(self.geometry.a, self.geometry.d, strict=True))
 
     def packed(self) -> dict[str, Any]:
         """Return the message for the page."""
@@ -88,11 +86,10 @@ class Look:
             return [*state.actual_q, *state.reference_q, *[0.0] * (2 * self.joints + 2 * bends), *bodies]
         if len(truth.body_poses) == len(bodies):
             bodies = truth.body_poses
-        gears = _parts(truth.gear_deflection, truth.static_gear_deflection, self.joints)
         return [
             *truth.motor_q,
             *state.reference_q,
-            *gears,
+            *_parts(truth.gear_deflection, truth.static_gear_deflection, self.joints),
             *_parts(truth.link_deflection, truth.static_link_deflection, bends),
             *bodies,
         ]

@@ -38,11 +38,11 @@ class Pilot:
         self.holder: int | None = None  # number of the tab that has control; None if no tab has
         self._arm: Arm | None = None
         self._held: AsyncExitStack | None = None
-        self._task: asyncio.Task[None] | None = None
+        self._task: asyncio.Task[bool] | None = None
         self._jog = (0, 0.0)
         self._jog_until = self._jog_heard = 0.0
         self._jog_barred = False  # until the button is released
-        self._jogging: asyncio.Task[None] | None = None
+        self._jogging: asyncio.Task[bool] | None = None
         self._changing = asyncio.Lock()
 
     async def take(self, tab: int) -> bool:
@@ -70,8 +70,9 @@ class Pilot:
                 return
             if self.busy:
                 await self.stop()
-            await self._end(self._jogging)
-            await self._end(self._task)
+            for task in filter(None, (self._jogging, self._task)):
+                task.cancel()
+                await asyncio.wait([task])
             held, self._held, self._arm, self.holder = self._held, None, None, None
             with contextlib.suppress(RefusedError, ClientError):  # the robot may be gone
                 if held is not None:
@@ -93,33 +94,28 @@ class Pilot:
         self._jog_until, self._jog_barred = 0.0, True
         if self._task is not None:
             self._task.cancel()  # a motion may have a further leg
-        try:
-            await self._robot.stop()
-        except (RefusedError, ClientError) as error:
-            self._say(str(error))
+        await self._told(self._robot.stop())
 
-    def do(self, tab: int, doing: Doing) -> bool:
-        """Start an action for the tab that has control, one at a time; return whether it was started."""
-        if self.holder != tab or self._arm is None:
-            self._say("this tab does not have control: take it first")
-            return False
+    def do(self, tab: int, doing: Doing) -> None:
+        """Start an action for the tab that has control, one at a time."""
+        if (arm := self._lent(tab)) is None:
+            return
         if self.busy:
             self._say("the arm is still moving: wait, or stop it")
-            return False
-        self._task = asyncio.create_task(self._told(doing(self._arm)))
-        return True
+        else:
+            self._task = asyncio.create_task(self._told(doing(arm)))
 
     async def set(self, tab: int, doing: Doing) -> bool:
         """Change a setting for the tab that has control, even while the arm moves; return whether it was changed."""
-        if self.holder != tab or self._arm is None:
+        arm = self._lent(tab)
+        return arm is not None and await self._told(doing(arm))
+
+    def _lent(self, tab: int) -> Arm | None:
+        """Return the arm if the tab has control, else tell it."""
+        if self.holder != tab:
             self._say("this tab does not have control: take it first")
-            return False
-        try:
-            await doing(self._arm)
-        except (RefusedError, ClientError, ProtocolError) as error:
-            self._say(str(error))
-            return False
-        return True
+            return None
+        return self._arm
 
     def jog(self, tab: int, joint: int, direction: float) -> None:
         """Jog a joint for the next quarter of a second; call it repeatedly while the button is down."""
@@ -148,19 +144,15 @@ class Pilot:
         if not found.ready:
             self._say(found.sentence)
 
-    async def _told(self, doing: Awaitable[Any]) -> None:
+    async def _told(self, doing: Awaitable[Any]) -> bool:
+        """Wait for an action, and show why it failed; return whether it succeeded."""
         try:
             await doing
         except (RefusedError, ClientError, ProtocolError) as error:
             self._jog_barred = True
             self._say(str(error))
-
-    async def _end(self, task: asyncio.Task[None] | None) -> None:
-        if task is None or task.done():
-            return
-        task.cancel()
-        with contextlib.suppress(asyncio.CancelledError):
-            await task
+            return False
+        return True
 
     async def _play_jog(self, arm: Arm) -> None:
         loop, info = asyncio.get_running_loop(), await self._robot.info()

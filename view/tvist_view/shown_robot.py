@@ -79,29 +79,28 @@ class Watcher:
             for kind, content in waiting:
                 await self.tab.send(kind, content)
             robot = self.robot
-            if robot is None or robot.running is None:
+            if robot is None or (running := robot.running) is None:
                 continue
             if (status := robot.status(self.tab.number)) is not None and status != self.status:
                 self.status = status
                 await self.tab.send("status", status)
-            running = robot.running
             running.update()
             if (row := running.row()) is None or running.state is None or not self.free:
                 continue
             self.free = False
             if number % NOTES_EVERY == 0:
                 note = after_stop(running.signals())
-            state, columns = running.state, running.since(self.count)
-            self.count = running.count
+            state = running.state
             frame = {
                 "t": state.timestamp,
                 "row": [round(value, 6) for value in row],
-                "samples": columns,
+                "samples": running.since(self.count),
                 "f_d": state.estimated_f_d[0] if state.estimated_f_d else None,
                 "zeta": state.estimated_zeta[0] if state.estimated_zeta else None,
                 "delay": state.shaper_delay,
                 "note": note,
             }
+            self.count = running.count
             await self.tab.send("frame", frame)
 
 
@@ -114,7 +113,6 @@ class ShownRobot:
         self._way = ObservedArm()
         self.watchers: set[Watcher] = set()
         self._ends: list[Callable[[], None]] = []
-        self._robot: Robot | None = None
         self._doer: Doer | None = None
         self._info: Info | None = None
         self._io: Io | None = None
@@ -182,7 +180,7 @@ class ShownRobot:
         look = Look(info.geometry, info.payload)
         place = self._place
         self.robots = await robots_at(place.endpoint, place.security, place.namespace)
-        self._robot, self._info, self._absent = robot, info, ""
+        self._info, self._absent = info, ""
         self.running, self._way = LatestSignals(look), ObservedArm()
         pilot = Pilot(robot, f"view-{os.getpid()}", self._say)
         self._doer = Doer(robot, look, pilot, self._judge, self._say, self._result)
@@ -194,7 +192,7 @@ class ShownRobot:
             await self._ask(robot, pilot)
         finally:
             self._deaf()
-            self._robot = self._doer = self.running = None
+            self._doer = self.running = None
             if pilot.holder is not None:
                 await pilot.give_back(pilot.holder)
 
@@ -202,8 +200,8 @@ class ShownRobot:
         """Subscribe to the robot while a tab shows it: servers compute the truth only for subscribers."""
         if not self.watchers:
             self._deaf()
-        elif self._robot is not None and self.running is not None and not self._ends:
-            robot, running = self._robot, self.running
+        elif self._doer is not None and self.running is not None and not self._ends:
+            robot, running = self._doer.robot, self.running
             self._ends = [
                 robot.on_state(running.add),
                 robot.on_truth(running.add),
@@ -247,7 +245,7 @@ class ShownRobot:
         }
 
     def _on_event(self, event: Event) -> None:
-        self._way.hear(event)
+        self._way.seen.add(event.kind)
         if event.kind in SHOWN_EVENTS and event.why:
             self._say(event.why)
 
@@ -255,7 +253,7 @@ class ShownRobot:
         self._io = io
 
     def _result(self, result: dict[str, Any]) -> None:
-        self._way.compared()
+        self._way.seen.add("compared")
         for watcher in self.watchers:
             watcher.put("result", result)
 

@@ -50,11 +50,10 @@ def signals_of(look: Look, states: Sequence[State], truths: Mapping[int, Truth])
     time = np.array([state.timestamp for state in states])
     if truths:
         alpha = np.full(len(time), np.nan)  # the sensor's noise would look like vibration
-        known = [(place, truths[state.tick]) for place, state in enumerate(states) if state.tick in truths]
-        if known:
-            forces = np.array([truth.tool_acceleration for _, truth in known])
-            up = upward([truth.flange_pose[3:] for _, truth in known])
-            alpha[[place for place, _ in known]] = np.linalg.norm(tool_acceleration(forces, up), axis=1)
+        if known := {place: truths[one.tick] for place, one in enumerate(states) if one.tick in truths}:
+            forces = np.array([truth.tool_acceleration for truth in known.values()])
+            up = upward([truth.flange_pose[3:] for truth in known.values()])
+            alpha[list(known)] = np.linalg.norm(tool_acceleration(forces, up), axis=1)
     else:
         measured = np.array([state.actual_tool_accelerometer for state in states]).reshape(-1, 3)
         angles = np.array([state.actual_q for state in states]).reshape(len(time), -1)
@@ -72,7 +71,7 @@ class LatestSignals:
 
     def __init__(self, look: Look) -> None:
         self._look = look
-        self._states: deque[State] = deque()
+        self._states: deque[State] = deque(maxlen=KEPT)
         self._truths: dict[int, Truth] = {}
         self.kept: deque[tuple[float, float, float, float]] = deque(maxlen=KEPT)
         self.count = 0  # number of samples since the start
@@ -91,16 +90,15 @@ class LatestSignals:
             if len(self._truths) > 4 * LATE_TICKS:
                 del self._truths[min(self._truths)]
             return
-        if self.state is not None and message.tick <= self.state.tick:
-            if message.tick == self.state.tick:
-                return  # published again
+        last = -1 if self.state is None else self.state.tick
+        if message.tick == last:
+            return  # published again
+        if message.tick < last:
             self._states.clear()
             self._truths.clear()
             self.kept.clear()
         self.state = message
         self._states.append(message)
-        if len(self._states) > KEPT:
-            self._states.popleft()
 
     def row(self) -> list[float] | None:
         """Return the arm's position at the latest tick that is completely known; None before the first one."""
@@ -121,7 +119,7 @@ class LatestSignals:
             self.kept.append(sample)
             self.count += 1
         self._shown = states[-1]
-        for _ in range(len(states) - 2):
+        for _ in states[2:]:
             self._states.popleft()
 
     def since(self, count: int) -> list[list[float]]:
@@ -132,8 +130,7 @@ class LatestSignals:
 
     def signals(self) -> Signals:
         """Return all samples that are kept."""
-        columns = np.array(self.kept).reshape(-1, 4).T
-        return Signals(*columns)
+        return Signals(*np.array(self.kept).reshape(-1, 4).T)
 
 
 def moves(signals: Signals) -> tuple[float, float] | None:

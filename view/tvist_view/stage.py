@@ -20,6 +20,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 LARGEST = 16 * 2**20  # largest message from a page [byte]; the largest ones are frames of a film
+LARGEST_PORT = 65535
 WAITS_S = 1.0  # how long a tab may take to close its connection when the server ends [s]
 
 
@@ -82,6 +83,8 @@ async def open_stage(
             f"address is {address}: other machines could open the page and move the robot, since it knows no "
             "passwords. Add --insecure to accept that, or forward the port: ssh -L 8080:127.0.0.1:8080 HOST"
         )
+    if not 0 <= port <= LARGEST_PORT:  # the socket would stay open
+        raise StageError(f"port is {port}: must be 0 to {LARGEST_PORT}, such as --port 8081")
     numbers = itertools.count(1)
 
     async def serve_tab(connection: ServerConnection) -> None:
@@ -95,18 +98,14 @@ async def open_stage(
         path = urlsplit(request.path).path
         if path == "/":
             return _found("text/html; charset=utf-8", page.encode())
-        content = parts(path)
-        return (
-            connection.respond(404, "not found\n")
-            if content is None
-            else _found("application/octet-stream", content)
-        )
+        if (content := parts(path)) is None:
+            return connection.respond(404, "not found\n")
+        return _found("application/octet-stream", content)
 
     try:
         with socket.create_server(
             (address, port), family=socket.AF_INET6 if ":" in address else socket.AF_INET
         ) as listening:
-            port = listening.getsockname()[1]
             async with serve(
                 serve_tab,
                 sock=listening,
@@ -116,20 +115,22 @@ async def open_stage(
                 close_timeout=WAITS_S,
                 logger=_QUIET,
             ):
-                yield f"http://{f'[{address}]' if ':' in address else address}:{port}"
-    except (OSError, OverflowError) as error:
+                yield f"http://{f'[{address}]' if ':' in address else address}:{listening.getsockname()[1]}"
+    except OSError as error:
         raise StageError(
-            f"cannot listen on {address} port {port}: {getattr(error, 'strerror', None) or error}. "
-            "Another port: --port 8081"
+            f"cannot listen on {address} port {port}: {error.strerror or error}. "
+            "Give another port, such as --port 8081"
         ) from error
 
 
 def _found(kind: str, content: bytes) -> Response:
-    headers = Headers(
-        {"Content-Type": kind, "Content-Length": str(len(content)), "Cache-Control": "no-store"}
-    )
-    headers["Content-Security-Policy"] = "frame-ancestors 'none'"  # against clickjacking
-    return Response(200, "OK", headers, content)
+    headers = {
+        "Content-Type": kind,
+        "Content-Length": str(len(content)),
+        "Cache-Control": "no-store",
+        "Content-Security-Policy": "frame-ancestors 'none'",  # against clickjacking
+    }
+    return Response(200, "OK", Headers(headers), content)
 
 
 def _may(request: Request, *, anywhere: bool) -> bool:
@@ -139,10 +140,8 @@ def _may(request: Request, *, anywhere: bool) -> bool:
     Host reveals a site whose name resolves to this machine.
     """
     origin, host = request.headers.get("Origin"), request.headers.get("Host", "")
-    named = urlsplit(f"//{host}").hostname or ""
-    if not (anywhere or is_local(named)):
-        return False
-    return origin is None or urlsplit(origin).netloc == host
+    ours = anywhere or is_local(urlsplit(f"//{host}").hostname or "")
+    return ours and (origin is None or urlsplit(origin).netloc == host)
 
 
 def is_local(address: str) -> bool:

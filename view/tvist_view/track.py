@@ -36,7 +36,6 @@ class Track:
             raise TrackError("the recording contains no state, so there is nothing to show")
         self.label, self.look, self._states, self._origin = label, look, states, origin
         self._truths = {truth.tick: truth for truth in truths}
-        self.has_truth = bool(self._truths)
         found = signals_of(look, states, self._truths)
         self.signals: Signals = replace(found, time=found.time - origin)
 
@@ -68,7 +67,7 @@ class Track:
             "label": self.label,
             "look": self.look.packed(),
             "reach": self.look.reach,
-            "truth": self.has_truth,
+            "truth": bool(self._truths),
             "width": len(rows[0]),
             "times": _packed(np.array([state.timestamp for state in states]) - self._origin - start),
             "rows": _packed(np.array(rows)),
