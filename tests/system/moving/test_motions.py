@@ -52,7 +52,7 @@ def test_speed_slider_of_the_robot_slows_motions(arm, bridge):
         try:
             eventually(lambda: "the speed slider of the robot is at 50 %: so are motions" in warnings)
             with states_of(robot) as states:
-                control.move_j(beside(robot, 0.05), velocity=0.4)
+                control.move_j(beside(robot, 0.04), velocity=0.4, acceleration=3.0)
             assert max(map(speed, states)) < 0.22
         finally:
             assert io.setSpeedSlider(1.0)
