@@ -69,7 +69,7 @@ def test_client_of_a_killed_server_raises_and_reconnects_to_the_next_one():
             with pytest.raises(RefusedError, match="no_control"):
                 robot.request(KeepAlive(token=token))
             with robot.control("me") as arm:
-                arm.move_j([0.05, *Q1[1:]])
+                arm.move_j([0.01, *Q1[1:]])
 
 
 class Running(Served):

@@ -51,11 +51,12 @@ class Nodes:
         )
         self._kinds: dict[str, Callable[[Element], object]] = {
             "Placeholder": lambda _: None, "SubProgram": lambda _: None,  # defined before the program
-            "Folder": self._folder, "Comment": self._comment, "Script": self._script, "Wait": self._wait,
-            "Halt": self._halt, "Popup": self._popup, "Assignment": self._assignment, "If": self._if,
-            "Loop": self._loop, "Switch": self._switch, "Set": self._set, "Force": self._force,
-            "CallSubProgram": self._call, "Contributed": self._contributed, "Move": moves.move,
-            "Waypoint": moves.waypoint, "CircleMove": moves.circle, DIRECTION: moves.direction,
+            "Halt": lambda node: self.text.label(node, "Halt", "halt"), "Folder": self._folder,
+            "Comment": self._comment, "Script": self._script, "Wait": self._wait,
+            "Popup": self._popup, "Assignment": self._assignment, "If": self._if, "Loop": self._loop,
+            "Switch": self._switch, "Set": self._set, "Force": self._force, "CallSubProgram": self._call,
+            "Contributed": self._contributed, "Move": moves.move, "Waypoint": moves.waypoint,
+            "CircleMove": moves.circle, DIRECTION: moves.direction,
         }  # fmt: skip
 
     def children(self, node: Element) -> None:
@@ -89,9 +90,6 @@ class Nodes:
     def _comment(self, node: Element) -> None:
         words = " ".join((node.get("comment") or "").split())
         self.text.label(node, f"'{words}'")
-
-    def _halt(self, node: Element) -> None:
-        self.text.label(node, "Halt", "halt")
 
     def _script(self, node: Element) -> None:
         if node.find("./expression/*") is not None:
