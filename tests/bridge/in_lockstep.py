@@ -32,7 +32,7 @@ RUN = 1  # number of the run of the program
 
 @dataclass(frozen=True)
 class Link:
-    """A connection that delays packages, and where one that is lost comes late with all that follow it."""
+    """A connection that delays packages; a lost one is sent again and holds up all later ones."""
 
     delay: float = 1.0  # mean time on the way [ms]
     jitter: float = 0.5  # largest deviation from it [ms]
@@ -44,7 +44,7 @@ IDEAL = Link(delay=0.5, jitter=0.0, loss=0.0)  # a connection on which each pack
 
 
 class Way:
-    """One direction of a link: what is sent arrives in the order in which it was sent."""
+    """One direction of a link, in which packages keep their order."""
 
     def __init__(self, link, seed):
         self._link, self._random, self._last = link, np.random.default_rng(seed), 0.0
@@ -71,7 +71,7 @@ class Heard(Sink):
 
 
 class Side:
-    """A controller that a client has control of, beside the events that it tells."""
+    """A controller that a client controls, and its events."""
 
     def __init__(self, setup, plant):
         self.controller, heard = Controller(setup, plant), Heard()
@@ -116,7 +116,7 @@ class HiddenRobot(Side):
 
 @dataclass
 class Counts:
-    """What the link and the limits did."""
+    """Counts of what happened on the link and at the limits."""
 
     ticks: int = 0  # ticks since the beginning
     played: dict[int, int] = field(default_factory=dict)
@@ -125,7 +125,7 @@ class Counts:
 
     @property
     def usual(self):
-        """Age that most of them have."""
+        """Most frequent age."""
         return max(self.played, key=lambda age: self.played[age])
 
 
@@ -145,7 +145,7 @@ class Port:
         self._measured = measured(robot.controller.latest)
 
     def measure(self):
-        """Return where the robot's target is."""
+        """Return a measurement at the robot's target position."""
         state = self.robot.controller.latest
         found = measured(state)
         return Measurement(
@@ -153,7 +153,7 @@ class Port:
         )
 
     def step(self, command):
-        """Send the set-point, and let the robot tick; return its row with which this tick began."""
+        """Send the set-point and let the robot tick; return the newest row from before the tick."""
         counts, robot = self.counts, self.robot
         now = TICK * counts.ticks
         row = self._back.arrival(now)
@@ -179,7 +179,7 @@ class Port:
         return int(self.robot.controller.io(wrench=False).output_int_register[place])
 
     def _deliver(self, now):
-        """Write the newest package that has arrived, which is all that the program can see."""
+        """Write the newest package that has arrived; the program cannot see earlier ones."""
         values = None
         while self._packages and self._packages[0][0] <= now:
             values = self._packages.popleft()[1]
@@ -221,7 +221,7 @@ class Bridge(Side):
 
 
 def setup_of(description, q, payload, shaper, seed):
-    """Return the setup of a robot whose calibration is that of its model, and whose gear errors are a seed's."""
+    """Return the setup of a robot with its model's calibration and the gear errors of a seed."""
     return Setup(
         description=description, q=tuple(q.tolist()), payload=payload, shaper=shaper, clock="free", seed=seed,
         calibration=load_calibration(f"{description.robot.name}_modal"),
@@ -229,7 +229,7 @@ def setup_of(description, q, payload, shaper, seed):
 
 
 def measured(state):
-    """Return what a robot's row says."""
+    """Return the measurement in a robot's state."""
     return Measurement(
         np.array(state.actual_q), np.array(state.actual_qd), np.array(state.actual_moment),
         np.array(state.actual_tool_accelerometer), timestamp=state.timestamp,

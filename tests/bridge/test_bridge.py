@@ -60,16 +60,6 @@ def test_over_an_ideal_link_an_external_shaper_equals_an_internal_one_with_a_del
     assert np.abs(through[-1, 0] - NEAR).max() < 1e-9
 
 
-def test_equal_seeds_reproduce_motions_over_a_lossy_link():
-    def motion(link):
-        bridge = Bridge(UR5E, 5, Q1, PAYLOAD, "zv", link)
-        bridge.send(MoveJ, q=tuple(NEAR.tolist()))
-        return targets(bridge, 300).tobytes()
-
-    lossy = Link(loss=0.02)
-    assert motion(lossy) == motion(lossy) != motion(Link())
-
-
 PAPER = ("Q2", "Q1", "Q3", "Q1")  # where the paper's motions end, from Q1
 SPEEDS = ((1.5, 2.0, 100.0), (1.05, 1.4, 50.0), (0.8, 2.0, 200.0))
 """Velocity, acceleration and jerk of the motions [rad/s, rad/s², rad/s³]; the first are the paper's."""

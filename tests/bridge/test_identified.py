@@ -26,7 +26,7 @@ PLACES = 60  # number of unseen configurations of each robot
 
 
 class Rows(Port):
-    """The same with rows at a lower rate: measurements are those of every so many periods."""
+    """A port that measures only once in `every` periods."""
 
     def __init__(self, every, *more):
         super().__init__(*more)

@@ -8,14 +8,14 @@ from .wire import Wire
 
 @pytest.fixture(scope="module")
 def realtime():
-    """A robot in real time that tells no truth."""
+    """A robot in real time, without the option truth."""
     with Served() as served:
         yield served
 
 
 @pytest.fixture(scope="module")
 def lockstep():
-    """A robot whose time a client steps, and that tells the truth."""
+    """A robot in lockstep, with the option truth."""
     with Served("--clock", "lockstep", "--truth") as served:
         yield served
 

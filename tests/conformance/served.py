@@ -1,4 +1,4 @@
-"""`tvist serve`: a process, a free port, and what it says on stderr."""
+"""`tvist serve` in a process of its own, with a free port."""
 
 import os
 import signal
@@ -10,19 +10,19 @@ from tests import forked
 from tests.places import free_endpoint
 
 PATIENCE = 300.0
-"""After how long something is taken to hang [s], on the slowest of machines: no test looks at how fast it is."""
+"""Longest wait, on the slowest machine [s]: no test measures speed."""
 NOISE = ("Traceback", "leaked", "nanobind", "Exception ignored", "Fatal Python error", "panicked")
-"""What no process says that ended well."""
+"""Words on stderr that only a fault causes."""
 
 
 def finished(*words, timeout=PATIENCE, run=forked.run, **more):
-    """A program of Python's that has ended, well or not: its exit code, and what it said."""
+    """Run a Python program to its end; return its exit code and output."""
     command = [sys.executable, *map(str, words)]
     return run(command, capture_output=True, text=True, timeout=timeout, check=False, **more)
 
 
 def refused_to_start(*options, endpoint=None):
-    """What `tvist serve` says when it does not begin, and its exit code."""
+    """Return exit code and message of a `tvist serve` that refuses to start."""
     with_port = ("--listen", endpoint or free_endpoint())
     refused = finished("-m", "tvist_cli", "serve", *with_port, *options)
     assert refused.stdout == ""
@@ -32,7 +32,7 @@ def refused_to_start(*options, endpoint=None):
 
 
 class Served:
-    """A robot in a process of its own; several where there is no name but the option --robots.
+    """A robot in a process of its own, or several if `name` is None and --robots is given.
 
     Args:
         options: Further options.
@@ -40,8 +40,8 @@ class Served:
         endpoint: Where it listens.
         router: Where it connects to instead.
         around: Words before the command line, such as `ip netns exec`.
-        cold: Whether it starts from nothing, as its environment or its start matters.
-        python: The Python of another environment that runs it; it then starts from nothing.
+        cold: Whether a new interpreter runs it instead of a fork, because its environment or start matters.
+        python: Interpreter of another environment, which implies `cold`.
     """
 
     program = ("-m", "tvist_cli", "serve")  # what Python runs
@@ -76,7 +76,7 @@ class Served:
             raise AssertionError(f"tvist serve did not come up: {self.said}")
 
     def wait_until_said(self, words):
-        """Wait until it says something on stderr."""
+        """Wait until it has written these words to stderr."""
         with self._news:
             assert self._news.wait_for(lambda: words in self.said, PATIENCE), self.said
 
@@ -85,18 +85,18 @@ class Served:
         return "".join(self.lines)
 
     def end(self, number=signal.SIGTERM):
-        """Send a signal and wait for the end; the exit code."""
+        """Send a signal, wait for the end, and return the exit code."""
         self.process.send_signal(number)
         return self.wait()
 
     def wait(self):
-        """Wait for it to end; the exit code."""
+        """Wait for the end, and return the exit code."""
         code = self.process.wait(PATIENCE)
         self._reader.join(PATIENCE)
         return code
 
     def kill(self):
-        """Make sure that it is gone, and its pipe closed."""
+        """Kill it if it still runs, and close its pipe."""
         if self.process.poll() is None:
             self.process.kill()
         self.process.wait(PATIENCE)
@@ -104,7 +104,7 @@ class Served:
         self.process.stderr.close()
 
     def assert_quiet(self):
-        """Nothing on stderr that looks like an error nobody foresaw."""
+        """Check that stderr shows no unforeseen error."""
         assert not [word for word in NOISE if word in self.said], self.said
 
     def __enter__(self):

@@ -1,4 +1,4 @@
-"""A client of the wire alone, as somebody would write it who has read only INTERFACE: eclipse-zenoh and msgpack."""
+"""A client that knows only the protocol, written with eclipse-zenoh and msgpack."""
 
 import math
 import threading
@@ -9,7 +9,7 @@ from tests.conformance.session import plain_session
 from zenoh.handlers import Callback
 
 PATIENCE = 100.0
-"""After how long what must come is taken to be lost [s], on the slowest of machines."""
+"""Longest wait for a message, on the slowest machine [s]."""
 TICK = 0.002
 STATE_FIELDS = {
     "type", "tick", "timestamp", "robot_mode", "safety_mode", "runtime_state", "setpoint_sequence", "reference_q",
@@ -67,7 +67,7 @@ class Wire:
         return self
 
     def wait(self, topic, wanted=_any, *, since=0, timeout=PATIENCE):
-        """The first message from number `since` on that is wanted; it may have come already."""
+        """Return the first wanted message from number `since` on; it may have come already."""
         messages, looked = self.received[topic], since
         found = None
 
@@ -89,22 +89,22 @@ class Wire:
         return found
 
     def next(self, topic, wanted=_any, **options):
-        """The first message to come from now on that is wanted."""
+        """Return the first wanted message that comes from now on."""
         return self.wait(topic, wanted, since=len(self.received[topic]), **options)
 
     def state(self):
-        """The next state."""
+        """Return the next state."""
         self.listen("state")
         return self.next("state")
 
     def until(self, tick):
-        """The state of a tick, or the first after it."""
+        """Return the state of a tick, or the first after it."""
         return self.wait("state", lambda state: state["tick"] >= tick)
 
     # ---------------------------------------------------------------- what a client sends
 
     def ask(self, key, payload=None, timeout=PATIENCE):
-        """Every reply to a query, decoded; each must be `reply`, in MessagePack."""
+        """Return all replies to a query, decoded; each must be `reply` in MessagePack."""
         answers = []
         for reply in self.session.get(key, payload=payload, timeout=timeout):
             assert reply.ok is not None, f"answered by reply_err: {reply.err.payload.to_bytes()!r}"
@@ -113,21 +113,21 @@ class Wire:
         return answers
 
     def raw(self, payload):
-        """The one answer to bytes on the command key."""
+        """Return the only answer to bytes on the command key."""
         (answer,) = self.ask(self.key("command"), payload)
         return answer
 
     def command(self, type, **fields):  # noqa: A002  the wire's name
-        """The one answer to a command."""
+        """Return the only answer to a command."""
         return self.raw(msgpack.packb({"type": type, **fields}))
 
     def begin(self, type, **fields):  # noqa: A002  the wire's name
-        """Send a command without waiting; its answer comes into what this returns."""
+        """Send a command without waiting; return the handler that gets its answer."""
         payload = msgpack.packb({"type": type, **fields})
         return self.session.get(self.key("command"), payload=payload, timeout=PATIENCE)
 
     def take(self, right, client):
-        """Be present as a client that holds control or the clock; the token."""
+        """Announce a client, take control or the clock for it, and return the token."""
         self.announce(client)
         taken = self.command(f"take_{right}", client=client)
         assert taken["type"] == "accepted", taken
@@ -144,14 +144,14 @@ class Wire:
         self.put(msgpack.packb({"type": "setpoint", **fields}))
 
     def announce(self, client):
-        """The optional liveliness token of a client."""
+        """Declare the liveliness token of a client."""
         self._declared.append(self.session.liveliness().declare_token(self.key(f"client/{client}")))
 
     # ---------------------------------------------------------------- control
 
     @contextmanager
     def control(self, client="wire", **fields):
-        """Hold control; the token. Whatever moves at the end is stopped."""
+        """Yield the token of control; at the end, reset the robot and release control."""
         answer = self.command("take_control", client=client, **fields)
         assert answer["type"] == "accepted", answer
         token = answer["token"]
@@ -162,7 +162,7 @@ class Wire:
             self.command("release_control", token=token)
 
     def step(self, token, ticks, **fields):
-        """Let ticks pass in lockstep; the last one's state."""
+        """Step time in lockstep; return the last state."""
         self.listen("state")
         answer = self.command("simulation.step", token=token, ticks=ticks, **fields)
         assert answer["type"] == "done", answer

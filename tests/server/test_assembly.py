@@ -25,7 +25,6 @@ def test_robots_are_spread_evenly_over_processes(robots, data):
 @pytest.mark.parametrize(
     ("content", "named"),
     [
-        ({"workers": 3}, "workers is 3: must be at most the number of robots, 2"),
         ({"connect": ["tcp/h:1"], "listen": ["tcp/h:2"]}, "connect, listen and workers exclude each other"),
         ({"connect": ["tcp/h:1"], "metrics": "9447"}, "connect, metrics and workers exclude each other"),
         ({"listen": ["unixsock-stream//tmp/x"]}, "Unix sockets are for the server's own"),

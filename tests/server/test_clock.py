@@ -19,7 +19,7 @@ PERIOD = 0.002
 
 
 class FakeHost:
-    """Counts its ticks, and says when there were enough."""
+    """Counts its ticks; `reached` is set after `enough` of them."""
 
     def __init__(self, enough=5):
         self.failure = None
@@ -46,7 +46,7 @@ class FakeHost:
 
 @contextmanager
 def ticking(*robots, **options):
-    """Robots driven in real time until each has ticked enough, and what else is waited for has come."""
+    """Drive robots in real time until the body has ended and each has ticked often enough."""
     clock = Realtime(robots, PERIOD, **options)
     clock.start()
     yield
@@ -163,7 +163,7 @@ def recorder():
 
 
 def test_recorders_get_the_priority_below_that_of_the_tick_thread(monkeypatch, recorder):
-    """Otherwise the tick waits for whatever program takes the processor from one that holds the interpreter's lock."""
+    """A program that displaced a recorder holding the interpreter's lock would delay the tick."""
     asked = []
 
     def ask(which, policy, parameter):
@@ -207,7 +207,7 @@ def test_in_lockstep_jobs_run_but_no_tick_starts_by_itself():
 
 
 def test_in_lockstep_the_state_is_repeated_even_if_many_jobs_arrive(monkeypatch):
-    """A new client gets the state although telemetry, say, comes in as often."""
+    """A new client gets the state even if other jobs, such as telemetry, come as often."""
     monkeypatch.setattr("tvist_server.clock.REPEAT_EVERY", 0.01)
     robot, repeated = TickedRobot(FakeHost()), threading.Event()
     clock = Lockstep(robot, repeated.set)
@@ -223,7 +223,7 @@ def test_in_lockstep_the_state_is_repeated_even_if_many_jobs_arrive(monkeypatch)
 
 
 def test_clients_are_warned_when_an_overload_begins_and_when_it_ends(monkeypatch):
-    """A clock of numbers: each tick takes 16 ms of it for a while, and then none."""
+    """On a simulated clock, each tick takes 16 ms until the first warning, and then no time."""
     passed, told = [0.0], threading.Event()
 
     class Slow(FakeHost):

@@ -219,7 +219,7 @@ inertia = [0.01, 0, 0, 0.01, 0, 0.01]
 
 @pytest.mark.parametrize("name", ["state.toml", "state.json"])
 def test_a_state_file_overrides_start_and_shaper(tmp_path, name):
-    """What is carried may be above the rating."""
+    """The carried payload may exceed the rating."""
     file = tmp_path / name
     content = tomllib.loads(STATE)
     file.write_text(json.dumps(content) if name.endswith("json") else STATE)
@@ -267,8 +267,7 @@ def test_the_servo_lag_is_that_of_the_calibration_unless_given(tmp_path, values,
     known = msgspec.structs.replace(calibration(), robot="UR5e", servo_lag_s=0.05, servo_gain=900.0)
     file.write_bytes(calibration_to_json(known))
     given = {"calibration": str(file), "shaper": "none", "enable_motion": True, "plant": "ur://127.0.0.1"}
-    moved = config(**(given | values))
-    assert moved.setup().plant.maker.keywords["lag"] == (lag and ServoLag(*lag))
+    assert config(**(given | values)).setup().plant.maker.keywords["lag"] == (lag and ServoLag(*lag))
 
 
 def test_without_a_profile_defaults_are_those_of_the_paper():

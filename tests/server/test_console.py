@@ -13,7 +13,7 @@ STOP = Event(tick=7, kind="protective_stop", code="limit_torque", why="torque of
 
 @pytest.fixture
 def said(caplog):
-    """The lines of a console that was closed."""
+    """Return a function that closes a console and returns its lines."""
 
     def said(console):
         console.start()

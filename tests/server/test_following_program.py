@@ -38,7 +38,7 @@ DOCUMENTED = {
 
 
 class Followed:
-    """What the program has done.
+    """Record of what the program does.
 
     Attributes:
         told: What `servoj` was told, one posture a call, and the tick of each.
@@ -67,7 +67,7 @@ class Followed:
         self.at.append(self.tick)
 
     def play(self, packages, arrivals):
-        """Let packages arrive, by their places in a list: those of each tick in turn."""
+        """Write the packages that arrive in each tick, given by their indices."""
         for come in arrivals:
             for place in come:
                 self.write(*packages[place])
@@ -89,7 +89,7 @@ class Followed:
         return r.ProgramEnded(self.output(r.ENDED))
 
     def assert_kept(self, last_came):
-        """Check all that holds whatever came; `last_came` is the tick of the last new number."""
+        """Check what holds for any input; `last_came` is the tick of the last new number."""
         assert (np.diff(self.at) == 1).all(), "a period in which it tells `servoj` nothing holds the arm back"
         told = np.array([HERE, *self.told])
         assert np.abs(np.diff(told, axis=0)).max(initial=0.0) <= self.most * (1 + 1e-9)
@@ -148,7 +148,7 @@ class OnRobot(Followed):
 
 
 class Alone(Followed):
-    """The program with nothing but registers, on an arm that follows some periods later."""
+    """The program with registers alone, on an arm that follows `lag` periods later."""
 
     def __init__(self, *, speed=0.5, deceleration=4.0, before=None, lag=LAG, step=H):
         super().__init__(speed, deceleration, step)
@@ -186,7 +186,7 @@ class Alone(Followed):
 
 
 def packages(path, count, order=RUN, before=0):
-    """The input packages of set-points: rows of a path, from the first on, with the numbers after `before`."""
+    """Return the input packages of the first `count` rows of a path, numbered from `before` + 1."""
     window, made = Window(), []
     window.number = before
     for row in path[:count]:
@@ -196,13 +196,13 @@ def packages(path, count, order=RUN, before=0):
 
 
 def swings(count, speed, *, rest=30, h=H):
-    """Postures that rest, and then swing with a largest speed [rad/s], shape (count, 6)."""
+    """Return postures that rest, then swing up to a speed [rad/s], shape (count, 6)."""
     passed = np.maximum(np.arange(count) - rest, 0) * h
     return HERE + np.outer(speed / 4.0 * np.sin(4.0 * passed) ** 2, (1.0, -0.15, 0.1, 0.2, 0.3, -1.0))
 
 
 def late(random, count, *, base=1.0, jitter=0.6, stalls=0.0, longest=12):
-    """Packages by the tick in which they arrive, in order; a stall, of up to `longest` ticks, holds up the rest."""
+    """Return the packages that arrive in each tick; a stall of up to `longest` ticks holds up all later ones."""
     arrivals, free = [[] for _ in range(count + int(base + jitter) + longest + 3)], 0.0
     for k in range(count):
         if random.random() < stalls:
@@ -213,12 +213,12 @@ def late(random, count, *, base=1.0, jitter=0.6, stalls=0.0, longest=12):
 
 
 def of_path(path, numbers):
-    """Set-points by their numbers; before the first one, the arm counts as there."""
+    """Return set-points by their numbers; number 0 stands for the first one."""
     return path[np.maximum(np.array(numbers) - 1, 0)]
 
 
 def followed(path, arrivals, count, kind=Alone, **changes):
-    """A program that has had packages of a path; the last tick with one."""
+    """Return a program that has received packages of a path, and the last tick with one."""
     robot = kind(**changes)
     begun = robot.tick
     robot.play(packages(path, count), arrivals)
@@ -255,7 +255,7 @@ def test_the_wrap_of_set_point_numbers_changes_nothing():
 @examples(20)
 @given(seed=st.integers(0, 2**31), speed=st.floats(0.05, 3.0), jitter=st.floats(0.0, 0.99))
 def test_on_a_good_link_every_set_point_is_played_exactly(seed, speed, jitter):
-    """Packages that come up to a period late or early at random are waited for by one period."""
+    """The program waits one period for packages that come up to a period early or late."""
     path = swings(600, 0.99 * speed)
     arrivals = late(np.random.default_rng(seed), 560, base=1.0, jitter=jitter / 2)
     robot, last = followed(path, arrivals[:560], 560, speed=speed)
@@ -269,7 +269,7 @@ def test_on_a_good_link_every_set_point_is_played_exactly(seed, speed, jitter):
 @examples(30)
 @given(seed=st.integers(0, 2**31), speed=st.floats(0.1, 2.5))
 def test_on_a_bad_link_deviations_are_smooth_and_decay(seed, speed):
-    """Packages late by up to 12 periods and then at once, some twice, some never."""
+    """Packages are late by up to 12 periods, repeated, or lost."""
     random, count = np.random.default_rng(seed), 400
     jitter, stalls, repeated, left_out = random.uniform(0.0, [2.0, 0.05, 0.3, 0.05])
     path = swings(count + 400, 0.9 * speed)
@@ -293,7 +293,7 @@ def test_on_a_bad_link_deviations_are_smooth_and_decay(seed, speed):
 
 
 def garbled(random, package, wildness):
-    """A package of which something may be wrong."""
+    """Return a package with random errors."""
     package = list(package)
     if random.random() < 0.01:
         at = random.integers(2, len(package))
@@ -308,7 +308,7 @@ def garbled(random, package, wildness):
 @examples(30)
 @given(seed=st.integers(0, 2**31), speed=st.floats(0.1, 3.0), wildness=st.sampled_from([1e-3, 0.1, 5.0]))
 def test_garbled_packages_never_exceed_the_limits_and_the_arm_ends_at_rest(seed, speed, wildness):
-    """Every fourth time on a whole robot."""
+    """Every fourth case runs on a whole robot."""
     random, count = np.random.default_rng(seed), 300
     path = swings(count, 0.9 * speed)
     robot = (Alone if seed % 4 else OnRobot)(speed=speed)
@@ -352,7 +352,7 @@ LATE = (
 
 @pytest.mark.parametrize(("speed", "share"), [(0.05, 0.97), (2.5, 1.0)])
 def test_joints_at_the_speed_limit_catch_up_after_a_bad_link(speed, share):
-    """On a robot of 125 Hz; neither do they stay behind, since the program may be faster than the set-points."""
+    """They catch up because the program may be a little faster than the set-points; the robot has 125 Hz."""
     count, step = 400, 0.008
     speeds = np.clip((np.arange(count) - 8) * step * 40.0 * speed, 0.0, share * speed)
     path = HERE + np.outer(np.cumsum(speeds) * step, (1.0, -0.15, 0.1, 0.2, 0.3, -1.0))
@@ -426,7 +426,7 @@ def test_the_first_set_point_may_be_at_most_10_mrad_away(away):
 @pytest.mark.parametrize("number", [0, 1])
 @pytest.mark.parametrize("waits", [0, 50])
 def test_a_waiting_program_ends_on_request(number, waits):
-    """Else the robot would take no program for as long as it waits."""
+    """Otherwise the robot would take no other program while it waits."""
     package = (number, -RUN, *(4 * tuple(HERE)))
     robot = Alone(before=None if waits else package)
     robot.steps(waits)
@@ -457,7 +457,7 @@ def test_the_program_ends_if_the_arm_does_not_follow(lag, why):
 
 @pytest.mark.parametrize(("how", "periods", "moment"), [("pause", 25, 90), ("stop", 25, 160)])
 def test_the_program_ends_after_a_pause(how, periods, moment):
-    """Of more than 40 ms, also if the sender goes on meanwhile: what has come counts no more."""
+    """The pause is longer than 40 ms; set-points that come during it are not played."""
     path = swings(1500, 0.45)
     sent = packages(path, 1400)
     robot = OnRobot()

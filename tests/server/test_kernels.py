@@ -59,7 +59,7 @@ SLEEP = "import time; print('{}', flush=True); time.sleep(1000)"
 
 @pytest.fixture
 def begun(monkeypatch):
-    """What the processes run that compile, by part; those that were started."""
+    """Programs of the compiling processes by part, and the started processes."""
     programs, started = {}, []
 
     def begin(part):

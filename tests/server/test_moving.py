@@ -54,7 +54,6 @@ from tvist_server.rtde.wire import Field, WireType
 from tvist_server.watching.address import place_of
 from tvist_server.watching.connection import RtdeConnection
 from tvist_server.watching.variables import NEEDED, OPTIONAL
-from tvist_server.watching.watched_robot import WatchedRobot
 
 Q = np.array([0.3, -1.2, 1.5, -1.8, -1.5, 0.2])
 GOOD = Sight(
@@ -91,7 +90,7 @@ def test_inputs_that_cannot_be_claimed_are_reported(types, words):
 
 @pytest.fixture(scope="module")
 def sent():
-    """What our own robot sends on its primary interface."""
+    """Package of a simulated robot's primary interface."""
     controller = Robot().controller
     return robot_state(UR5E, Instruments(UR5E).snapshot(controller.latest, controller.io()))
 
@@ -207,7 +206,7 @@ def test_each_stop_of_a_robot_has_its_own_reason():
 @examples(40)
 @given(st.lists(st.tuples(st.integers(0, 6), st.floats(0.0, 0.3)), max_size=60), st.sampled_from([1, 4]))
 def test_periods_follow_the_robots_clock_or_the_local_one_during_silence(gaps, interval):
-    """Rows come late and in bunches; each of the robot's periods is computed once, and none twice."""
+    """Rows come late and in bunches; each of the robot's periods is computed exactly once."""
     pace, now, tick = ControlPeriods(), 10.0, 5000
     pace.row(tick, now)
     first = pace.tick
@@ -231,7 +230,7 @@ def test_periods_follow_the_robots_clock_or_the_local_one_during_silence(gaps, i
 
 
 class Written:
-    """A robot whose program follows, and what is written to it."""
+    """A robot that keeps what is written to it, with registers that the test sets."""
 
     def __init__(self):
         self.newest = {"target_q": tuple(Q)} | dict.fromkeys(r.OUTPUTS, (0,))
@@ -246,7 +245,7 @@ class Written:
 
 @pytest.fixture
 def new_run(monkeypatch):
-    """A run whose program has not begun, and its robot."""
+    """A run whose program has not started, and its robot."""
     nothing = SimpleNamespace(trouble=None, close=lambda: None)
     monkeypatch.setattr("tvist_server.moving.run.Upload", lambda *_: nothing)
     robot = Written()
@@ -309,7 +308,7 @@ def test_registers_of_an_earlier_run_are_ignored(new_run):
 
 @pytest.mark.parametrize("how", ["a run of ours", "any program"])
 def test_a_program_that_replaces_the_running_one_is_detected(running, how):
-    """Any other program leaves the registers as ours has left them, and the robot says that it plays."""
+    """Another program does not change the registers that ours has left, and the robot reports PLAYING."""
     run, robot = running
     robot.says(r.STATE, r.ProgramState.FOLLOWING)
     for number in range(50):
@@ -363,7 +362,7 @@ def packed(row, recipe=1):
 
 
 class Far:
-    """A robot in the test's own time, its own socket and selector; `spoil` makes of its rows the bytes that come."""
+    """A robot in simulated time that stands in for socket and selector; `spoil` encodes its rows."""
 
     def __init__(self, patch):
         self.now, self.written, self.spoil, self.close = 50.0, [], packed, lambda: None
@@ -371,7 +370,7 @@ class Far:
         for module in ("watching.connection", "watching.watched_robot", "moving.moved_robot", "moving.run"):
             patch.setattr(f"tvist_server.{module}.time", times)
         patch.setattr("tvist_server.moving.run.Upload", self.upload)
-        patch.setattr(WatchedRobot, "_new_connection", lambda _: self.connected())
+        patch.setattr("tvist_server.watching.watched_robot.RtdeConnection", lambda *_: self.connected())
 
     def passed(self, duration=1e-7):
         self.now += duration

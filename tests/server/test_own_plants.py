@@ -61,8 +61,7 @@ def place(tmp_path):
 
 
 def test_an_installed_plant_is_found_by_name():
-    made = load_plant("mujoco").make(UR5E, body(setup().payload))
-    assert type(made).__name__ == MujocoArm.__name__
+    assert type(load_plant("mujoco").make(UR5E, body(setup().payload))).__name__ == MujocoArm.__name__
     with pytest.raises(OwnFileError, match=r"must be FILE\.py:NAME, or one of calibrated, .*mujoco"):
         load_plant("nobody")
 
@@ -102,7 +101,7 @@ def test_a_plant_is_pickled_by_reference_to_its_unchanged_file(place):
 
 
 def moved(chosen, path, ticks=300):
-    """The recording of a move."""
+    """Return the recording of a move."""
     host = LoopbackHost(chosen)
     token = decode_reply(host.request("a", encode(c.TakeControl(client="a", lease_s=30.0)))).token
     assert decode_reply(host.request("a", encode(c.MoveJ(token=token, q=tuple(Q2.tolist()))))).id == 1
@@ -156,7 +155,7 @@ SEED = 314159
 
 
 def test_a_hidden_robot_replays_exactly_and_publishes_no_hidden_value(tmp_path):
-    """Recorded setup and published info are those of the file, and no value that was drawn is in them or in a state."""
+    """Recorded setup and published info are those of the robot file, without any hidden value."""
     found = moved(setup(hidden=SEED), tmp_path / "hidden.mcap")
     again = replay_file(found)
     assert (again.first_difference, len(again.truths)) == (None, 0)
@@ -188,8 +187,7 @@ def test_options_that_would_reveal_a_hidden_robot_are_refused(given):
 
 
 def test_each_hidden_robot_has_its_own_seed():
-    config = ServeConfig(robots="ur5e*2", hidden=5)
-    assert [one.hidden for one in config.setups()] == [5, 6]
+    assert [one.hidden for one in ServeConfig(robots="ur5e*2", hidden=5).setups()] == [5, 6]
     assert free_setup(hidden=5, truth=False).hidden == 5
     with pytest.raises(StartError, match="hidden is 5, but truth is on"):
         free_setup(hidden=5)

@@ -116,8 +116,7 @@ def test_a_missing_shaper_file_is_refused(tmp_path):
 
 def test_a_shaper_is_pickled_by_reference_to_its_file(file):
     own = load_own(f"{file}:mine")
-    data = pickle.dumps(own)
-    assert pickle.loads(data) == own  # noqa: S301  it is ours
+    assert pickle.loads(pickle.dumps(own)) == own  # noqa: S301  it is ours
     file.write_text(MINE + "# another\n")
     other = pickle.dumps(load_own(f"{file}:thirds"))
     file.write_text(MINE)
@@ -169,7 +168,7 @@ def own(shaper):
 
 
 def robot(mine, **changes):
-    """A robot with a shaper of its own beside those that there are."""
+    """Return a robot with an own shaper."""
     given = own(mine)
     return Robot(**({"calibration": calibration(), "shaper": given.name, "own_shapers": (given,)} | changes))
 
@@ -209,7 +208,7 @@ FAILING = {
 
 @pytest.fixture(params=list(FAILING))
 def failing(request):
-    """A robot whose shaper fails once it is told to, that shaper, and words of the error."""
+    """A robot whose shaper fails once `failing` is set, the switch, and words of the error."""
     wrong, words = FAILING[request.param]
     turning = SimpleNamespace(failing=False)
 
@@ -286,7 +285,7 @@ def test_a_failing_shaper_is_refused_also_by_the_planner(failing):
 
 @pytest.fixture
 def recorded(file, tmp_path):
-    """A recording of a motion with a shaper of one's own."""
+    """A recording of a motion with an own shaper."""
     own = (load_own(f"{file}:mine"),)
     return moved(setup(calibration=calibration(), shaper="mine", own_shapers=own), tmp_path / "run.mcap")
 

@@ -24,7 +24,7 @@ LIGHT = {"mass": 2.0, "com": (0.0, 0.0, 0.04), "inertia": (0.002, 0.0, 0.0, 0.00
 
 
 class Served:
-    """A robot whose controller's thread is the test's own: jobs run when it says."""
+    """A robot whose jobs run when the test says."""
 
     def __init__(self, folder=None, **changes):
         start = setup(clock="realtime", **changes)
@@ -52,12 +52,12 @@ class Served:
         return kind(token=self.token, **fields)
 
     def serve(self, replies):
-        """Run jobs until there are so many replies."""
+        """Run jobs until there are this many replies."""
         while len(self.replies) < replies:
             self.do_next()
 
     def do_next(self):
-        """Run the next job, for which this waits."""
+        """Wait for the next job and run it."""
         with self.came:
             assert self.came.wait_for(lambda: self.jobs, WAIT), "no job came"
             job = self.jobs.popleft()
@@ -124,7 +124,7 @@ def test_a_program_of_the_folder_is_journaled_with_its_text(tmp_path):
 
 
 def test_an_outdated_plan_is_made_again(served):
-    """The other payload comes from a client that the queue of the first does not know of."""
+    """The other payload is set while the plan waits."""
     move = served.of(c.MoveJ, q=tuple(Q3.tolist()))
     served.send(move)
     served.do_next()  # tells what the plan depends on
@@ -173,7 +173,7 @@ def test_commands_of_one_client_keep_their_order(served):
 
 @pytest.mark.parametrize(("stop", "waiting"), [(c.Stop(), 0), (c.Stop(), 12), (ProgramStop(), 12)])
 def test_a_stop_also_ends_motions_that_wait_to_be_planned(served, waiting, stop):
-    """Also where something moved when both were sent, and the motion is planned when that has come to rest."""
+    """This also holds if the arm moves when both are sent, so that the motion is planned later."""
     served.ask(served.of(c.MoveJ, q=(*Q2[:5].tolist(), 0.05)))
     served.tick(40)
     for _ in range(waiting):

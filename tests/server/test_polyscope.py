@@ -24,7 +24,7 @@ TOOL = "<feature referencedName='Joint_6_name'/>"
 
 @pytest.fixture
 def lines(tmp_path):
-    """The lines of a program without indentation, between its first label and its end."""
+    """Return a function that translates nodes to lines without indentation, head and end."""
 
     def translate(*nodes, skip=(), **parts):
         text = text_of(tmp_path / "p.urp", saved(*nodes, **parts).encode(), frozenset(skip))

@@ -1,6 +1,5 @@
 """The recorder takes messages without blocking, and counts what it drops."""
 
-import io
 import os
 import queue
 import signal
@@ -113,39 +112,9 @@ def test_an_unwritable_path_or_existing_file_is_refused_before_a_thread_starts(p
     assert path.read_bytes() == b"precious"
 
 
-class FullDisk(io.FileIO):
-    """A disk with room for a hundred kilobytes."""
-
-    def write(self, data):
-        if self.tell() + len(data) > 100_000:
-            raise OSError(28, "No space left on device")
-        return super().write(data)
-
-
-def test_a_full_disk_stops_the_recording_and_is_reported_once(path, monkeypatch):
-    disk = FullDisk(path, "w")
-    monkeypatch.setattr(type(path), "open", lambda *_: io.BufferedWriter(disk))
-    told = []
-    before = set(threading.enumerate())
-    recorder = Recorder(path, INFO, {}, wait=True, on_error=told.append)
-    tick = 0
-    while not told:
-        recorder.state(state(tick))
-        tick += 1
-    lost = recorder.dropped
-    recorder.state(state(tick))
-    assert recorder.dropped == lost + 1
-    recorder.close()
-    assert told == [recorder.error]
-    assert recorder.error.endswith("has stopped and is incomplete: No space left on device")
-    assert str(path) in recorder.error
-    assert disk.closed
-    assert set(threading.enumerate()) == before
-
-
 @pytest.fixture
 def looking(monkeypatch):
-    """A recorder that looks for its file at every turn."""
+    """Let recorders check their files continuously."""
     monkeypatch.setattr(recorder_module, "CHECK_EVERY", 0.0)
 
 

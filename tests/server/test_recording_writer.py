@@ -26,7 +26,7 @@ INFO, STATE, TRUTH = golden("info", Info), golden("state", State), golden("truth
 
 
 def session(ticks):
-    """A little of everything, in the order a server would say it."""
+    """Yield messages of all kinds in a server's order."""
     for tick in range(1, ticks + 1):
         if tick == 1:
             yield entry_of(tick, MoveJ(token="t", q=(0.5, 1.0)), client="a")

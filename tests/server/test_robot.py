@@ -14,7 +14,7 @@ from tvist_server.robot import ServedRobot
 
 
 class Told(Gateway):
-    """Keeps what is told of a kind."""
+    """Keeps messages of one kind."""
 
     def __init__(self, kind):
         self.kind, self.told = kind, []

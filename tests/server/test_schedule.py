@@ -12,7 +12,7 @@ PERIOD = 0.002
 
 
 def played(robots, ticks, start=1000.0, delay=lambda _: 0.0):
-    """Ticks that begin when they are due, or a delay later: robot, beginning, lateness, missed; by their order."""
+    """Return robot, start, lateness and missed ticks of each tick, which starts `delay` after it is due."""
     schedule, now, begun = Schedule(robots, PERIOD, start), start, []
     for number in range(ticks):
         now = max(now, schedule.due) + delay(number)
@@ -43,7 +43,7 @@ def test_robots_within_their_share_tick_after_one_wake_up(robots):
 
 
 def test_missed_ticks_are_counted_for_each_robot():
-    """5.5 periods of nothing: each robot's ticks that begin a period late or more are missed, and no others."""
+    """After a pause of 5.5 periods, ticks that begin a period late or more count as missed, and no others."""
     robots, delay = 4, 5.5 * PERIOD
     begun = played(robots, 40 * robots, delay=lambda number: delay if number == 10 * robots else 0.0)
     for robot in range(robots):
@@ -77,7 +77,7 @@ def test_deadlines_do_not_drift():
 
 
 def loaded(overload, schedule, now, seconds, takes):
-    """Tick for some seconds, each tick taking this long; what was said and when, and the number of ticks."""
+    """Tick for some seconds; return the messages with their times, the number of ticks, and the time."""
     said, ticks, until = [], 0, now + seconds
     while now < until:
         now = max(now, schedule.due)
@@ -118,7 +118,7 @@ def test_an_overload_begins_after_two_bad_and_ends_after_five_good_seconds():
 
 
 def test_overload_has_hysteresis():
-    """A tenth of the ticks missed is too few for it to begin and too many for it to end."""
+    """Missing a tenth of the ticks neither starts nor ends an overload."""
 
     def second(overload, missed):
         return [told for tick in range(500) if (told := overload.note(int(tick < missed))) is not None]

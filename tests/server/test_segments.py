@@ -25,7 +25,7 @@ IO = golden("io", Io)
 
 
 def messages(ticks, first=1):
-    """What a robot sends: inputs and outputs once, and an event now and then."""
+    """Yield a robot's messages: io once, and an event every seventh tick."""
     for tick in range(first, first + ticks):
         yield Entry(tick=tick, kind="missed", count=1)
         if tick == 1:
@@ -51,7 +51,7 @@ def run_names(path, run, numbers):
 
 
 def assert_whole(content, last, at_least=KEEP):
-    """Nothing is missing or twice from the first state to the last."""
+    """Check that no message is missing or repeated."""
     ticks = [state.tick for state in content.states]
     assert all(after - before == 1 for before, after in pairwise(ticks))
     assert ticks[-1] == last

@@ -27,7 +27,7 @@ class AnyTorque:
 
 
 def commands():
-    """What the drives get in a motion from Q1 to Q3, and while the arm rests before and after it."""
+    """Return the drive commands of a motion from Q1 to Q3 with rests around it."""
     motion, q = quickest_motion(JointLine(Q1, Q3), MotionLimits(1.5, 2.0, 100.0)), [Q1] * 5
     while not motion.finished:
         q.append(motion.next())
@@ -36,7 +36,7 @@ def commands():
 
 
 def errors(lag, lookahead=LOOKAHEAD, gain=GAIN):
-    """Distance of the arm from where it is wanted at each tick [rad]."""
+    """Return the largest deviation of a joint from its reference at each tick [rad]."""
     motion = commands()
     start = motion[0].q
     servo = ServoFollower((start, 0.0 * start, 0.0 * start), arm_limits(UR5E), REACH, AnyTorque())
@@ -97,7 +97,7 @@ def test_set_points_keep_range_and_speed_and_reach_rest(seed, fastest):
 
 
 def test_compensation_does_not_exceed_the_range_of_a_joint():
-    """Where the arm brakes hard, what leads it would otherwise go beyond its end for a moment."""
+    """When the arm brakes hard at its end, the compensation would otherwise exceed the range."""
     end = REACH.copy()
     motion = quickest_motion(JointLine(end - 0.5, end), MotionLimits(3.0, 20.0, 2000.0))
     q = [end - 0.5] * 2

@@ -24,7 +24,7 @@ shutdown = module.Shutdown()
      ("sum(range(10**12))", "atexit.register(on_and_on)"), ("sum(range(10**12))", "shutdown.on_request(on_and_on)")],
 )  # fmt: skip
 def test_a_hanging_shutdown_is_ended_with_a_traceback(what, where):
-    """Also in code that keeps the interpreter's lock once the signal was heard."""
+    """This also holds for code that keeps the interpreter's lock after the signal."""
     code = HANGING.format(what=what, where=f"signal.raise_signal(signal.SIGTERM); {where}")
     ended = subprocess.run([sys.executable, "-c", code], stderr=subprocess.PIPE, check=False)
     assert (ended.returncode, b"in on_and_on" in ended.stderr) == (1, True)

@@ -29,7 +29,7 @@ LONG = tuple(StepSetpoint(sequence=n, q=(3.0,) * 6) for n in range(1000))
 
 
 class Network:
-    """A robot's intake, and the thread behind it: jobs are done when the test says."""
+    """A robot's intake; jobs run when the test says."""
 
     def __init__(self):
         self.host, self.jobs, self.replies = Host(Controller(setup(clock="lockstep")), Sink()), Jobs(), []
@@ -123,7 +123,7 @@ def test_jobs_posted_by_a_job_wait_for_the_next_turn():
 @examples(40)
 @given(st.lists(st.lists(CLIENTS, max_size=5), max_size=8), st.lists(CLIENTS, max_size=5))
 def test_during_a_step_jobs_of_other_clients_are_done_in_order(ticks, later):
-    """A step, before whose ticks these clients each send something; and what they send after it."""
+    """Clients post jobs before each tick of a step and after it."""
     jobs, done, sent = Jobs(), [], []
 
     def post(client):

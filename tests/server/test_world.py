@@ -116,7 +116,7 @@ def test_a_start_inside_an_obstacle_is_refused(tmp_path):
 
 @pytest.mark.parametrize("given", [{"q": (-2.7, -2.2, -1.8, -0.7, 1.57, 0.0)}, {"payload": HEAVY}])
 def test_a_reset_into_an_obstacle_is_refused_and_changes_nothing(given, tmp_path):
-    """Where the arm stands it is clear by less than it would bend under another payload."""
+    """The arm stands so close to the plate that a heavier payload would bend it into the plate."""
     clear, light = (-2.7, -1.8, -1.8, -1.1, 1.57, 0.0), msgspec.structs.replace(HEAVY, mass=0.1)
     x, y, z = Robot(q=clear, carried=light, truth=True).controller.truth().flange_pose[:3]
     (tmp_path / "scene.xml").write_text(

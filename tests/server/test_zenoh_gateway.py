@@ -23,7 +23,7 @@ WAIT = 60.0
 
 
 class RecordingIntake:
-    """Notes what arrives, in order; answers at once, from another thread, unless it is told to hold."""
+    """Notes what arrives, in order, and answers from another thread unless `hold` is set."""
 
     def __init__(self):
         self.notes = queue.Queue()
@@ -51,7 +51,7 @@ class RecordingIntake:
         self.notes.put(("ended", session))
 
     def next(self, *, ended=False):
-        """The next note; of the ends of sessions only where they are asked for."""
+        """Return the next note; ends of sessions only if `ended`."""
         while True:
             note = self.notes.get(timeout=WAIT)
             if ended or note[0] != "ended":
@@ -154,7 +154,7 @@ def test_the_end_of_a_session_is_reported_while_another_holds_its_token(gateway,
 
 
 def taken(gateway, topic, *, taken):
-    """Wait until a gateway takes a topic, or does no longer."""
+    """Wait until a gateway wants a topic, or no longer wants it."""
     end = time.monotonic() + WAIT
     while (topic in gateway.wanted_topics) != taken:
         assert time.monotonic() < end
@@ -216,11 +216,6 @@ def test_an_endpoint_that_cannot_listen_is_refused_with_the_reason(endpoint, sen
         Network([endpoint])
     assert endpoint in str(raised.value)
     assert sentence in str(raised.value)
-
-
-def test_a_port_in_use_is_refused(network, endpoint):
-    with pytest.raises(GatewayError, match=rf"^cannot listen on {endpoint}: the port is in use: stop"):
-        Network([endpoint])
 
 
 READER = """

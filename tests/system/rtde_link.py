@@ -19,6 +19,8 @@ class RtdeLink(Relay):
         """Kinds of the reader's packages, and for each connection the timestamps of the rows that passed."""
         self.slow, self.lost, self.repeated = False, 0.0, 0.0
         """Options of the link: rows at 125 Hz instead of 500 Hz, and shares of rows to drop and to repeat."""
+        self.earlier = 0.0
+        """Time by which timestamps are set back, as if the robot had been restarted [s]."""
         super().__init__(target)
 
     def takes(self):
@@ -44,7 +46,8 @@ class RtdeLink(Relay):
                 if kind == PackageKind.DATA:
                     if self._random.random() < self.lost:
                         continue
-                    rows.append(_DOUBLE.unpack_from(payload, 1)[0])
+                    rows.append(_DOUBLE.unpack_from(payload, 1)[0] - self.earlier)
+                    whole = package(kind, payload[:1] + _DOUBLE.pack(rows[-1]) + payload[1 + _DOUBLE.size :])
                     whole *= 2 if self._random.random() < self.repeated else 1
                 out += whole
             return out

@@ -10,8 +10,6 @@ import pytest
 from tests.conformance.served import Served, free_endpoint
 from tests.conformance.wire import STOPPED, TICK
 
-from .bystander import Bystander
-
 pytestmark = pytest.mark.realtime
 
 CLIENT = Path(__file__).with_name("dying_client.py")
@@ -30,6 +28,15 @@ while True:
     session.get("tvist/ur5e/info", Callback(lambda reply: None, indirect=False), timeout=60.0)
     asleep.wait(0.001)
 """
+
+
+@pytest.fixture(scope="module")
+def realtime():
+    """A robot in real time, which has a small send buffer at a second endpoint, `narrow`."""
+    narrow = free_endpoint()
+    with Served("--listen", f"{narrow}#so_sndbuf=16384") as served:
+        served.narrow = narrow
+        yield served
 
 
 def test_resumed_client_cannot_continue_its_stream(realtime, bystander, start):
@@ -66,21 +73,19 @@ def test_suspended_client_loses_control_when_its_link_times_out(realtime, bystan
     bystander.assert_undisturbed()
 
 
-def test_client_that_queries_without_reading_is_disconnected(start, measured):
+def test_client_that_queries_without_reading_is_disconnected(realtime, bystander, start, measured):
     """Its answers delay those to others, once, for about a second, but no states."""
-    narrow = free_endpoint()
-    with Served("--listen", f"{narrow}#so_sndbuf=16384") as served, Bystander(served.endpoint) as bystander:
-        start("-c", NEVER_READING, narrow)
-        while not waiting(narrow):
-            bystander.until_later(10)
-        longest = 0
-        while waiting(narrow):
-            asked = bystander.received["state"][-1]["tick"]
-            bystander.info()
-            longest = max(longest, bystander.received["state"][-1]["tick"] - asked)
-        measured("longest time to an answer meanwhile [s of tick time]", longest * TICK)
-        bystander.assert_undisturbed()
-        served.assert_quiet()
+    start("-c", NEVER_READING, realtime.narrow)
+    while not waiting(realtime.narrow):
+        bystander.until_later(10)
+    longest = 0
+    while waiting(realtime.narrow):
+        asked = bystander.received["state"][-1]["tick"]
+        bystander.info()
+        longest = max(longest, bystander.received["state"][-1]["tick"] - asked)
+    measured("longest time to an answer meanwhile [s of tick time]", longest * TICK)
+    bystander.assert_undisturbed()
+    realtime.assert_quiet()
 
 
 def waiting(endpoint):

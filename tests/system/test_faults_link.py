@@ -101,10 +101,9 @@ def test_slow_link_drops_states_but_delivers_answers(proxy, bystander, measured)
         wire.listen("state", "event")
         with wire.control("far", lease_s=60.0) as token:
             proxy.rate = 200_000  # bytes per second; the states need 500 000
-            began = bystander.until_later(1000)["tick"]
+            bystander.until_later(300)
             motion = wire.command("move_j", token=token, q=[0.1, *Q1[1:]])["id"]
             assert wire.wait("event", lambda event: event["kind"] == "motion_done")["id"] == motion
-            bystander.until(began + 1000)
             asked = bystander.until_later()["tick"]
             assert wire.command("keep_alive", token=token) == {"type": "done"}
             newest, came = bystander.received["state"][-1]["tick"], len(wire.received["state"])
@@ -116,8 +115,10 @@ def test_slow_link_drops_states_but_delivers_answers(proxy, bystander, measured)
             wire.until(bystander.until_later()["tick"])
             under_way = sum(state["tick"] <= newest for state in wire.received["state"][came:])
             measured("states under way", under_way)
-            assert under_way < 1000  # without dropping there would be 1200 or more
-        measured("states dropped for this client", missing(wire))
+            assert under_way < 1000
+        dropped = missing(wire)
+        measured("states dropped for this client", dropped)
+        assert dropped > 0
     bystander.assert_undisturbed()
 
 

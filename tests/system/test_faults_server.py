@@ -1,14 +1,11 @@
 """Faults of the server: it is suspended, killed or blocked, or its arm fails."""
 
-import ast
+import json
 import signal
-from importlib.util import find_spec
-from pathlib import Path
 
 import pytest
 from tests.conformance.served import Served, free_endpoint
 from tests.conformance.wire import Q1, STOPPED, TICK
-from tests.system.shell import tvist
 
 from tvist_client import NotConnectedError, RefusedError
 from tvist_client.blocking import Robot
@@ -19,17 +16,15 @@ from .bystander import Bystander
 
 pytestmark = pytest.mark.realtime
 
-FAR = [2.0, *Q1[1:]]
-
-
-SUSPENDED = 0.5  # shortest time for which the server is suspended [s]
+FAR, NEAR = [2.0, *Q1[1:]], [0.2, *Q1[1:]]
+SUSPENDED = 0.3  # shortest time for which the server is suspended [s]
 
 
 def test_suspended_server_counts_missed_ticks_and_ends_leases_by_tick(measured):
     """This happens when a machine sleeps or a virtual one is moved. A shorter lease ends at its own tick."""
     with Served() as served, Bystander(served.endpoint) as bystander:
         token = bystander.command("take_control", client="mover")["token"]
-        motion = bystander.command("move_j", token=token, q=[0.2, *Q1[1:]])["id"]
+        motion = bystander.command("move_j", token=token, q=NEAR)["id"]
         before = bystander.next("state", lambda state: state["target_qd"][0] > 0.05)
         suspend(served, bystander)
         assert bystander.command("keep_alive", token=token) == {"type": "done"}
@@ -74,7 +69,7 @@ def test_client_of_a_killed_server_raises_and_reconnects_to_the_next_one():
             with pytest.raises(RefusedError, match="no_control"):
                 robot.request(KeepAlive(token=token))
             with robot.control("me") as arm:
-                arm.move_j([0.05, *Q1[1:]])
+                arm.move_j([0.01, *Q1[1:]])
 
 
 class Running(Served):
@@ -114,45 +109,21 @@ main()
 
 
 def test_ticks_continue_while_the_event_loop_is_blocked():
-    """If ticks waited for the loop, neither would ever continue."""
+    """The loop blocks until ticks pass, so if ticks waited for it, neither would continue."""
     with Running(BUSY_LOOP) as served, Bystander(served.endpoint) as bystander:
         for _ in range(2):  # the loop does its own work, too
             bystander.next("telemetry")
         bystander.assert_undisturbed()
 
 
-LOOKS = {("time", name) for name in ("time", "time_ns", "localtime", "gmtime", "ctime", "strftime")} | {
-    (module, name)
-    for module in ("datetime", "date")
-    for name in ("now", "today", "utcnow", "datetime", "date")
-}
-"""Functions and modules that read the wall clock."""
-
-
-@pytest.mark.parametrize(
-    "package",
-    ["tvist_server", "tvist_controller", "tvist_plant", "tvist_shaping", "tvist_urscript", "tvist_protocol"],
-)
-def test_server_does_not_read_the_wall_clock(package):
-    (folder,) = find_spec(package).submodule_search_locations
-    for path in Path(folder).rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            found = set()
-            if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
-                found = {(node.value.id, node.attr)}
-            elif isinstance(node, ast.ImportFrom):
-                found = {(node.module, alias.name) for alias in node.names}
-            assert not found & LOOKS, f"{path}:{node.lineno}"
-
-
-def test_failing_arm_is_stopped_and_recorded_and_another_robot_is_not_disturbed(tmp_path):
+def test_failing_arm_is_stopped_and_recorded_and_another_robot_is_not_disturbed(called, tmp_path):
     options = ("--robots", "ur5e*2", "--dump", str(tmp_path))
     with Served(*options, name=None) as served, Bystander(served.endpoint, "ur5e-1") as hit:
         with Bystander(served.endpoint, "ur5e-2") as other, hit.control("mover") as token:
             with other.control("other") as its:
-                goes_on = other.command("move_j", token=its, q=[0.6, *Q1[1:]])["id"]
+                goes_on = other.command("move_j", token=its, q=NEAR)["id"]
                 motion = hit.command("move_j", token=token, q=FAR)["id"]
-                hit.next("state", lambda state: state["target_qd"][0] > 0.3)
+                hit.next("state", lambda state: state["target_qd"][0] > 0.1)
                 assert hit.command("simulation.inject", token=token, fault="nan") == {"type": "done"}
                 event = hit.event("protective_stop")
                 assert event["code"] == "plant_failure"
@@ -170,4 +141,6 @@ def test_failing_arm_is_stopped_and_recorded_and_another_robot_is_not_disturbed(
         served.wait_until_said("look with tvist log analyze")
     (dump,) = tmp_path.glob("*.mcap")
     assert f"tvist-ur5e-1-{served.process.pid}-{event['tick']}" in dump.name
-    assert tvist("log", "analyze", dump, "--json").assert_done().json["events"]
+    code, out, err = called("log", "analyze", str(dump), "--json")
+    assert (code, err) == (0, "")
+    assert json.loads(out)["events"]

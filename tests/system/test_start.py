@@ -49,20 +49,8 @@ def all_are_starting(session, keys, words):
     return len(answers) == len(keys) and all(right)
 
 
-@pytest.mark.parametrize(
-    ("options", "names", "place"),
-    [
-        (ONE, ["ur5e"], ""),
-        (
-            (*ONE, "--robots", "ur5e*2", "--workers", "2", "--namespace", "hall-3"),
-            ["ur5e-1", "ur5e-2"],
-            "hall-3",
-        ),
-    ],
-)
-async def test_queries_are_answered_with_the_progress_until_the_robots_are_ready(
-    options, names, place, tmp_path, monkeypatch
-):
+async def started(options, names, place, tmp_path, monkeypatch):
+    """Start robots slowly; check what they answer to queries before they are ready, and then."""
     pipe = tmp_path / "progress"
     os.mkfifo(pipe)
     monkeypatch.setenv("PROGRESS", str(pipe))
@@ -89,6 +77,15 @@ async def test_queries_are_answered_with_the_progress_until_the_robots_are_ready
         served.assert_quiet()
     finally:
         served.kill()
+
+
+async def test_queries_are_answered_with_the_progress_until_the_robot_is_ready(tmp_path, monkeypatch):
+    await started(ONE, ["ur5e"], "", tmp_path, monkeypatch)
+
+
+async def test_robots_of_several_processes_answer_with_the_progress_until_ready(tmp_path, monkeypatch):
+    options = (*ONE, "--robots", "ur5e*2", "--workers", "2", "--namespace", "hall-3")
+    await started(options, ["ur5e-1", "ur5e-2"], "hall-3", tmp_path, monkeypatch)
 
 
 @pytest.mark.nightly

@@ -108,7 +108,7 @@ def test_each_getter_returns_the_value_of_the_robot_to_the_last_bit(tmp_path):
         step(1)
         with Client("rtde_receive", "RTDEReceiveInterface", host, "500.0") as robot:
             wire.command("move_j", token=token, q=NEAR)
-            for ticks in (100, 50, 700):
+            for ticks in (100, 50, 350):
                 last, snapshot = step(ticks)
                 found.append(read(robot, getters, last))
                 assert_told(found[-1], snapshot)

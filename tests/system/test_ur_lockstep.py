@@ -227,5 +227,4 @@ def test_arm_with_seven_joints_has_dashboard_and_interpreter_only():
         running(interface)
         assert interface.ask("load Q2.urp") == "Loading program: Q2.urp"
         assert interface.ask("play") == "Starting program"
-        state = wire.step(clock, 5000)
-        assert state["actual_q"] == pytest.approx([0.5] * 7, abs=0.01)
+        assert wire.step(clock, 5000)["actual_q"] == pytest.approx([0.5] * 7, abs=0.01)

@@ -1,6 +1,6 @@
 """A client whose program connects to it and follows its set-points, 500 per second.
 
-`python ur_driver.py HOST FAULT`: after 60 set-points it has a fault, see `FAULTS`.
+`python ur_driver.py HOST FAULT`: after 30 set-points it has a fault, see `FAULTS`.
 """
 
 import math
@@ -64,7 +64,7 @@ def cut(stream):
 
 def jump(stream):
     """Send a distant posture, with the base and the last joint turned."""
-    for _ in range(120):
+    for _ in range(60):
         stream.sendall(struct.pack(">6i", *(round(1e6 * angle) for angle in FAR)))
         stream.recv(4096)
         time.sleep(0.002)
@@ -86,7 +86,7 @@ def main(host, fault):
             script.sendall(PROGRAM.format(host=host, port=port).encode())
             stream, _ = server.accept()
         stream.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        steer(stream, range(60))
+        steer(stream, range(30))
         FAULTS[fault](stream)
 
 

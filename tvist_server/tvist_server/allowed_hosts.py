@@ -6,10 +6,8 @@ from collections.abc import Sequence
 
 from tvist_server.option_values import StartError
 
-LOCALHOST = "localhost"
 _NAME = re.compile(r"(?!.*(^|\.)\d+$)[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*")
 """Host names. The last label must not be a number: that would be a mistyped IP address."""
-IpAddress = ipaddress.IPv4Address | ipaddress.IPv6Address
 
 
 class AllowedHosts:
@@ -33,13 +31,13 @@ class AllowedHosts:
         """
         to, sender = ip_of(address), None if origin is None else ip_of(origin)
         if to.is_loopback or to.is_unspecified:  # a name or a wide network must not open it as a side effect
-            named = name == LOCALHOST and name in self._names
+            named = name == "localhost" and name in self._names
             inside = any(network.is_loopback and to in network for network in self._networks)
             return named or inside or (sender is not None and sender.is_loopback)
         return to == sender or name in self._names or any(to in network for network in self._networks)
 
 
-def ip_of(text: str) -> IpAddress:
+def ip_of(text: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address:
     """Parse an address without its zone, and unwrap an IPv4-mapped IPv6 address."""
     found = ipaddress.ip_address(text.partition("%")[0])
     return getattr(found, "ipv4_mapped", None) or found

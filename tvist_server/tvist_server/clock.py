@@ -123,14 +123,13 @@ class Lockstep(Clock):
 
     def __init__(self, robot: TickedRobot, repeat: Do) -> None:
         super().__init__([robot])
-        self._jobs = robot.jobs
         self._repeat = repeat
 
     def _run(self) -> None:
         # The deadline is absolute, because other jobs, such as telemetry, may also arrive every second.
-        due = time.monotonic() + REPEAT_EVERY
+        (robot,), due = self._robots, time.monotonic() + REPEAT_EVERY
         while self._running:
-            self._robots[0].guarded(partial(self._jobs.do_next, max(0.0, due - time.monotonic())))
+            robot.guarded(partial(robot.jobs.do_next, max(0.0, due - time.monotonic())))
             if self._running and time.monotonic() >= due:
                 self._repeat()
                 due = time.monotonic() + REPEAT_EVERY

@@ -11,11 +11,6 @@ from tvist_protocol.commands import Command, HandOver, TakeClock, TakeControl
 from tvist_protocol.replies import Refused, Reply
 from tvist_server.gateways.base import Answer, CommandIntake
 
-QueueJob = Callable[..., None]
-"""Queues a job, and the client that sent it if known, for before the next tick; from any thread, without blocking."""
-CarryOut = Callable[[Admitted, Answer], None]
-"""Queues a command for the controller's thread and answers it; from any thread, without blocking."""
-
 
 class RobotIntake(CommandIntake):
     """Admits valid messages to one robot and rejects others at once, without the controller."""
@@ -23,8 +18,8 @@ class RobotIntake(CommandIntake):
     def __init__(
         self,
         host: Host,  # only its thread-safe methods are called here
-        post: QueueJob,
-        carry_out: CarryOut,
+        post: Callable[..., None],  # queues a job, with its client if known, for the next tick
+        carry_out: Callable[[Admitted, Answer], None],  # queues a command and answers it
         complete_info: Callable[[bytes], bytes] = bytes,  # adds to an encoded `info`
     ) -> None:
         self._host, self._post, self._carry_out = host, post, carry_out

@@ -72,8 +72,7 @@ class ProgramFolder:
         if not (names := self.names()):
             return info
         content = decode(Info, info)
-        programs = sorted({*content.programs, *names})
-        return encode(msgspec.structs.replace(content, programs=programs))
+        return encode(msgspec.structs.replace(content, programs=sorted({*content.programs, *names})))
 
 
 def _checked(path: Path, text: str) -> str:

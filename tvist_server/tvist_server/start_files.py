@@ -19,8 +19,6 @@ from tvist_protocol.values import Joints, Payload, ResetMode, Seed
 from tvist_server.option_values import StartError, read_start_file
 from tvist_shaping import FirShaper
 
-ShaperChoice = Annotated[str, Meta(min_length=1, max_length=4096)]
-
 
 def read_cell(path: str) -> Cell:
     """Read a cell; its scene is one of the package's, or a file beside the cell."""
@@ -41,19 +39,15 @@ class InitialState(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     seed: Seed | None = None  # seed of sensor noise and gear errors
     payload: Payload | None = None  # payload that the arm carries, independent of the declared one
     mode: ResetMode | None = None  # robot mode
-    shaper: ShaperChoice | None = None  # name of the shaper, or FILE.py:NAME
+    shaper: Annotated[str, Meta(min_length=1, max_length=4096)] | None = None  # name or FILE.py:NAME
 
     def on(self, setup: Setup) -> Setup:
         """Return a setup with the fields of this state that are not None."""
         if self.shaper is not None:
             setup = with_shaper(setup, self.shaper)
-        given: dict[str, Any] = {
-            "q": self.q,
-            "seed": self.seed,
-            "carried": self.payload,
-            "mode": self.mode,
-        }
-        return replace(setup, **{name: value for name, value in given.items() if value is not None})
+        own = {"q": self.q, "seed": self.seed, "carried": self.payload, "mode": self.mode}
+        given: dict[str, Any] = {name: value for name, value in own.items() if value is not None}
+        return replace(setup, **given)
 
 
 def with_shaper(setup: Setup, shaper: str) -> Setup:

@@ -225,8 +225,7 @@ def _begin(
     """Run in a new process: close the pipes of other processes, ignore signals, then do the work."""
     for end in others:
         end.close()
-    signals = Shutdown()  # from now on a signal ends only the first process
-    signals.close()
+    Shutdown().close()  # from now on a signal ends only the first process
     do(ParentPipe(first, folder.remove))
 
 
@@ -234,10 +233,8 @@ def _rehearse(setup: Setup) -> None:
     """Compile and load what a robot needs, for the forked processes to share; a plug-in arm is not made here."""
     setup = replace(setup, plant=None)
     warm_up()
-    planner = Planner(setup)
-    planner.rehearse_scripts()
-    controller = Controller(setup)
-    Host(controller).tick()
+    Planner(setup).rehearse_scripts()
+    Host(Controller(setup)).tick()
 
 
 def _listed(names: Sequence[str], part: range) -> str:

@@ -23,7 +23,7 @@ def router(
         rate: Pass on at most this many states of each robot per second, repeatable: 10, or 10@INTERFACE for
             one network interface [all]. Commands, events and telemetry are not reduced.
         robot: Apply --rate to this robot, repeatable: [NAMESPACE/]NAME, or [NAMESPACE/]NAME*COUNT for NAME-1
-            to NAME-COUNT. All robots that are not listed share the rate of one.
+            to NAME-COUNT; the others are not reduced. Without this option, all robots share the rate of one.
         security: Use this folder made by tvist keys, with the roles of robots, clients and routers. The
             endpoint is then tls/ADDRESS:PORT.
         insecure: Accept remote connections without TLS; anyone can move the robots, and act as one.

@@ -19,16 +19,16 @@ from tvist_protocol.replies import Done, Refused
 from tvist_server.gateways.ur.deferred import Deferred
 from tvist_server.gateways.ur.interfaces import UrInterfaces
 
-from .desks import EVERYWHERE, Desk, until
+from .served_controller import EVERYWHERE, ServedController, until
 
 TOKEN = "the-token"
 
 
 class FakeControl:
-    """Stands for the way to the controller.
+    """Stands in for a connection's access to the controller.
 
-    Commands are recorded in `commands` and answered at once with `reply`; `refuse(code, why)` makes them refused,
-    `wait()` keeps the answers back until `answer()`. There is no program `nothing.urp`.
+    It records commands in `commands` and answers them at once with `reply`. After `refuse(code, why)` it refuses
+    them; after `wait()` it answers only at `answer()`. It has no program `nothing.urp`.
     """
 
     peer = "the client 10.0.0.2:50000 of port 30001"
@@ -56,7 +56,7 @@ class FakeControl:
         return later
 
     def asked(self, reply):
-        """A reply that comes at once."""
+        """Return an awaitable that has the reply already."""
         later = Deferred()
         later.set(reply)
         return later
@@ -68,7 +68,7 @@ class FakeControl:
         self._waiting = self._waiting or []
 
     def answer(self, reply=None, *, keep=False):
-        """Give every answer that is due; to one that asks again in it, too, unless further ones are kept back."""
+        """Answer all waiting commands; with `keep`, commands that these answers cause wait again."""
         waiting, self._waiting = self._waiting or [], [] if keep else None
         for later in waiting:
             later.set(reply or self.reply)
@@ -80,7 +80,7 @@ class FakeControl:
         answer()
 
     def leave(self):
-        """What lasted is over."""
+        """Count the end of an access."""
         self.left += 1
 
     def of(self, kind):
@@ -94,12 +94,12 @@ def controller_at_rest():
 
 
 def io(**changes) -> Io:
-    """Everything off, the paper's payload declared."""
+    """Return terminals that are all off, with the paper's payload declared and some changes."""
     return msgspec.structs.replace(controller_at_rest().io(), **changes)
 
 
 class Robot(robots.Robot):
-    """A controller in lockstep, and instruments that read each of its ticks."""
+    """A controller in lockstep whose instruments read every tick."""
 
     def __init__(self, description=UR5E, *, io_changes=None, **changes):
         super().__init__(description, clock="lockstep", **changes)
@@ -107,7 +107,7 @@ class Robot(robots.Robot):
         self.io = io(**({"payload": self.controller.declared} | (io_changes or {})))
 
     def tick(self, count=1):
-        """The snapshot of the last of so many ticks; each is read."""
+        """Tick, and return the last tick's snapshot."""
         for _ in range(count):
             snapshot = self.instruments.snapshot(super().tick(), self.io)
         return snapshot
@@ -120,19 +120,19 @@ def control() -> FakeControl:
 
 @pytest.fixture
 def sent() -> list[bytes]:
-    """What a session sent: pass `sent.append` as its `send`."""
+    """Bytes that a session has sent: pass `sent.append` as its `send`."""
     return []
 
 
 @pytest.fixture(scope="session")
 def ur5e() -> Callable[..., Robot]:
-    """Makes robots."""
+    """Return a function that makes robots."""
     return Robot
 
 
 @pytest.fixture(scope="session")
 def snapshots():
-    """A hundred snapshots of consecutive ticks of one that moves."""
+    """A hundred snapshots of consecutive ticks of a moving robot."""
     robot = Robot()
     robot.send(c.MoveJ, q=tuple(UR5E.poses["Q3"]))
     return [robot.tick() for _ in range(100)]
@@ -145,7 +145,7 @@ def snapshot(snapshots):
 
 @pytest.fixture
 def robot(snapshots) -> SimpleNamespace:
-    """What all interfaces of a robot share, as far as no interface is tested."""
+    """State that all interfaces of a robot share, without programs."""
     told, reported = [], []
     return SimpleNamespace(
         description=UR5E,
@@ -162,7 +162,7 @@ def robot(snapshots) -> SimpleNamespace:
 
 @pytest.fixture
 async def later(monkeypatch):
-    """The loop's clock stands, and jumps by so many seconds."""
+    """Stop the loop's clock; return a function that advances it [s]."""
     loop = asyncio.get_running_loop()
     passed = [loop.time()]
     monkeypatch.setattr(loop, "time", lambda: sum(passed))
@@ -170,30 +170,30 @@ async def later(monkeypatch):
 
 
 @pytest.fixture
-async def make_desk():
-    """Makes a controller with interfaces, whose arguments are the ports and the options of UrInterfaces."""
+async def make_served():
+    """Return a function that makes a controller with interfaces, given their ports and options."""
     made = []
 
     def make(ports=EVERYWHERE, **options):
-        made.append(desk := Desk())
-        desk.interfaces = UrInterfaces(desk, UR5E, "ur5e", "127.0.0.1", ports, **options)
-        return desk
+        made.append(served := ServedController())
+        served.interfaces = UrInterfaces(served, UR5E, "ur5e", "127.0.0.1", ports, **options)
+        return served
 
     yield make
-    for desk in made:
-        for writer in desk.writers:
+    for served in made:
+        for writer in served.writers:
             writer.close()
             with contextlib.suppress(ConnectionError):
                 await writer.wait_closed()
-        await desk.interfaces.shut()
-        await until(lambda desk=desk: not desk.interfaces._connections)
-        desk.interfaces.close()
+        await served.interfaces.shut()
+        await until(lambda served=served: not served.interfaces._connections)
+        served.interfaces.close()
 
 
 @pytest.fixture
-async def desk(make_desk):
-    """A robot that has made its first tick, for which its interfaces would wait."""
-    desk = make_desk()
-    await desk.tick()
-    await desk.interfaces.open()
-    return desk
+async def served(make_served):
+    """A controller after its first tick, with open interfaces."""
+    served = make_served()
+    await served.tick()
+    await served.interfaces.open()
+    return served

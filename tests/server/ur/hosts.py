@@ -1,4 +1,4 @@
-"""A robot as its interfaces see it, with programs."""
+"""The state that text interfaces share, and a client of them."""
 
 from tvist_server.gateways.ur.deferred import begin
 from tvist_server.gateways.ur.external_control import ExternalControl
@@ -10,11 +10,11 @@ from .decoders import message
 
 
 async def nobody(_host):
-    """A machine that does not answer."""
+    """Return None, as if the machine did not answer."""
 
 
 async def here(read):
-    """A file that is read at once."""
+    """Read a file at once."""
     return read()
 
 
@@ -23,7 +23,7 @@ def external(folder=None, fetch=nobody):
 
 
 def hear(request, answers):
-    """Begin a request, whose answer is added when it has come."""
+    """Begin a request; its answer is appended when it comes."""
 
     async def hearing():
         answers.append(await request)
@@ -32,14 +32,14 @@ def hear(request, answers):
 
 
 def host(robot):
-    """The fixture `robot`, with programs and what else the text interfaces share."""
+    """Add programs and an operational mode to the fixture `robot`."""
     robot.programs = Programs(robot, external())
     robot.operational_mode = NO_MODE
     return robot
 
 
 def told(robot):
-    """The robot messages that were broadcast."""
+    """Return the robot messages that all clients got."""
     return [message(package) for package in robot.told]
 
 

@@ -20,26 +20,26 @@ from .hosts import LineClient, host, told
 
 
 def at(tick=100, **values):
-    """A tick with these modes."""
+    """Return a snapshot with these modes."""
     known = {"robot_mode": 7, "safety_mode": 1, "safety_status": 1, "timestamp": 41.0, "runtime_state": 1}
     return SimpleNamespace(state=SimpleNamespace(tick=tick), **(known | values))
 
 
 def moved_to(robot, **values):
-    """The robot's last tick with other modes."""
+    """Change the modes of the robot's last tick."""
     robot.latest = at(**values)
 
 
 @pytest.fixture
-def desk(robot):
+def ur_robot(robot):
     """The robot, running and at rest."""
     moved_to(robot)
     return host(robot)
 
 
 @pytest.fixture
-def client(desk, control):
-    return LineClient(DashboardSession, desk, control)
+def client(ur_robot, control):
+    return LineClient(DashboardSession, ur_robot, control)
 
 
 # What clients match whole lines against, or compare them with.
@@ -112,12 +112,12 @@ POWER = [
     ("restart safety", 9, c.RestartSafety(**T)),
     ("unlock protective stop", 3, c.UnlockProtectiveStop(**T)),
 ]
-"""What is asked for in a safety mode, and the robot's command for it."""
+"""A line, the safety mode, and the command that the robot gets."""
 
 
-def test_power_and_safety_commands_fail_without_control(client, control, desk):
+def test_power_and_safety_commands_fail_without_control(client, control, ur_robot):
     for asked, safety, command in POWER:
-        moved_to(desk, safety_mode=safety, safety_status=safety)
+        moved_to(ur_robot, safety_mode=safety, safety_status=safety)
         control.reply = Done()
         assert not client.ask(asked).startswith("Failed")
         assert control.commands[-1] == command
@@ -125,26 +125,27 @@ def test_power_and_safety_commands_fail_without_control(client, control, desk):
         assert client.ask(asked) == f"Failed to execute: {asked}"
 
 
-def test_programs_and_modes_do_not_change_without_control(client, control, desk):
+def test_programs_and_modes_do_not_change_without_control(client, control, ur_robot):
     client.ask("load wait_program.urp")
     control.held_by_other = True
-    assert client.ask("is in remote control") == "false"
-    assert client.ask("play") == "Failed to execute: play"
-    assert client.ask("load Q1.urp") == "Error while loading program: Q1.urp"
-    assert client.ask("load installation default.installation") == (
-        "Failed to load installation: default.installation"
-    )
-    assert client.ask("set operational mode MANUAL") == "Failed setting operational mode: MANUAL"
-    assert client.ask("clear operational mode") == "Failed to execute: clear operational mode"
-    assert desk.programs.name == "wait_program.urp"
-    assert client.ask("robotmode") == "Robotmode: RUNNING"
-    assert client.ask("stop") == "Stopped"  # anyone may
+    for asked, answer in (
+        ("is in remote control", "false"),
+        ("play", "Failed to execute: play"),
+        ("load Q1.urp", "Error while loading program: Q1.urp"),
+        ("load installation default.installation", "Failed to load installation: default.installation"),
+        ("set operational mode MANUAL", "Failed setting operational mode: MANUAL"),
+        ("clear operational mode", "Failed to execute: clear operational mode"),
+        ("robotmode", "Robotmode: RUNNING"),
+        ("stop", "Stopped"),  # any client may stop the robot
+    ):
+        assert client.ask(asked) == answer
+    assert ur_robot.programs.name == "wait_program.urp"
 
 
-def test_power_on_twice_succeeds_and_a_stopping_arm_cannot_be_unlocked(client, control, desk):
+def test_power_on_twice_succeeds_and_a_stopping_arm_cannot_be_unlocked(client, control, ur_robot):
     control.refuse("wrong_mode", why="it moves")
     assert client.send("power on\nbrake release\n") == ["Powering on", "Brake releasing"]
-    moved_to(desk, safety_mode=3, safety_status=3)
+    moved_to(ur_robot, safety_mode=3, safety_status=3)
     assert client.ask("unlock protective stop").startswith("Cannot unlock protective stop until 5s after")
 
 
@@ -152,29 +153,29 @@ ROBOT_MODES = {-1: "NO_CONTROLLER", 3: "POWER_OFF", 4: "POWER_ON", 5: "IDLE", 6:
 SAFETY_MODES = {2: "REDUCED", 3: "PROTECTIVE_STOP", 5: "SAFEGUARD_STOP", 7: "ROBOT_EMERGENCY_STOP"}
 
 
-def test_modes_have_ur_s_names(client, desk):
+def test_modes_have_ur_s_names(client, ur_robot):
     for number, name in ROBOT_MODES.items():
-        moved_to(desk, robot_mode=number)
+        moved_to(ur_robot, robot_mode=number)
         assert client.ask("robotmode") == f"Robotmode: {name}"
     for number, name in SAFETY_MODES.items():
-        moved_to(desk, safety_mode=number, safety_status=number)
+        moved_to(ur_robot, safety_mode=number, safety_status=number)
         assert client.send("safetymode\nsafetystatus\n") == [f"Safetymode: {name}", f"Safetystatus: {name}"]
-    desk.latest = None
+    ur_robot.latest = None
     assert client.ask("robotmode") == "Robotmode: NO_CONTROLLER"
     assert client.ask("safetymode").startswith("Safetymode: ")
 
 
-def test_the_operational_mode_is_shared_by_all_clients(client, desk, control):
+def test_the_operational_mode_is_shared_by_all_clients(client, ur_robot, control):
     client.ask("set operational mode automatic")
-    assert LineClient(DashboardSession, desk, control).ask("get operational mode") == "AUTOMATIC"
+    assert LineClient(DashboardSession, ur_robot, control).ask("get operational mode") == "AUTOMATIC"
     client.ask("clear operational mode")
     assert client.ask("get operational mode") == "NONE"
 
 
-def test_popups_and_log_messages_are_sent_as_robot_messages(client, desk):
+def test_popups_and_log_messages_are_sent_as_robot_messages(client, ur_robot):
     client.ask("popup Mind the gap")
     client.ask("addToLog it went well")
-    window, line = told(desk)
+    window, line = told(ur_robot)
     assert (window.kind, window.values["text"], window.values["flags"]) == (2, "Mind the gap", [False] * 3)
     assert (line.kind, line.values["text"]) == (0, "it went well")
 
@@ -203,10 +204,10 @@ PLAYING, STOPPING, STOPPED = 2, 0, 1
 @pytest.mark.parametrize(
     ("asked", "answer"), [("stop", "Stopped"), ("load Q1.urp", "Loading program: Q1.urp")]
 )
-def test_stop_and_load_are_answered_once_the_arm_is_at_rest(client, control, desk, asked, answer):
+def test_stop_and_load_are_answered_once_the_arm_is_at_rest(client, control, ur_robot, asked, answer):
     control.reply = Accepted(id=7)
     client.send("load Q2.urp\nplay\n")
-    moved_to(desk, runtime_state=PLAYING)
+    moved_to(ur_robot, runtime_state=PLAYING)
     assert client.send(asked + "\nrobotmode\n") == []
     for tick, runtime in enumerate((PLAYING, STOPPING, STOPPING), start=101):
         assert client.session.sample(at(tick, runtime_state=runtime)) == b""
@@ -215,8 +216,8 @@ def test_stop_and_load_are_answered_once_the_arm_is_at_rest(client, control, des
     assert client.heard() == [answer, "Robotmode: RUNNING"]
 
 
-def test_stop_fails_if_the_arm_does_not_come_to_rest(client, desk):
-    moved_to(desk, runtime_state=PLAYING)
+def test_stop_fails_if_the_arm_does_not_come_to_rest(client, ur_robot):
+    moved_to(ur_robot, runtime_state=PLAYING)
     client.send("stop\n")
     client.session.sample(at(2599, runtime_state=PLAYING))
     assert client.heard() == []

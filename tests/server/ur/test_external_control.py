@@ -20,7 +20,7 @@ SENT = "# HEADER_BEGIN\nglobal a = 1\n# HEADER_END\nwhile a < 2:\n  sync()\nend\
 
 
 def of(robot, folder=None, answer=SENT):
-    """Programs, and the machines that are asked for one."""
+    """Return programs, and the list of machines that were asked for one."""
     asked = []
 
     async def fetch(host):

@@ -1,6 +1,6 @@
-"""Random bytes, split anywhere: each interface survives, and its other clients are served as before.
+"""Random bytes, split anywhere, break no interface and do not disturb its other clients.
 
-The controller is a real one. Its replies come late, as over a thread, so that clients go while they are on their way.
+The controller is real. Its replies come late, as from another thread, so that some clients leave before theirs.
 """
 
 import gc
@@ -25,8 +25,8 @@ from tvist_server.gateways.ur.rtde.session import RtdeSession
 
 from . import rtde_client
 from .decoders import split
-from .desks import ControllerThread
 from .hosts import external
+from .served_controller import ControllerThread
 
 INTERFACES = {
     "rtde": RtdeSession,
@@ -34,13 +34,13 @@ INTERFACES = {
     "realtime": RealtimeSession,
     "dashboard": DashboardSession,
 }
-CLIENTS = 4  # that send anything, of two hosts
-LIVES = 60  # packages that a client sends before it goes, on the average
+CLIENTS = 4  # number of clients that send random bytes, from two hosts
+LIVES = 60  # mean number of packages that a client sends before it leaves
 READ = ["timestamp", "actual_q"]
 
 
-class House(ControllerThread):
-    """A robot with interfaces and no sockets; `tick` lets time pass, `answer` gives the replies that are due."""
+class ServedWithoutSockets(ControllerThread):
+    """A robot whose interfaces have no sockets; `tick` lets time pass, `answer` gives the due replies."""
 
     def __init__(self):
         super().__init__(late=True)
@@ -78,15 +78,15 @@ class House(ControllerThread):
 
 
 class Client:
-    """A connection. What it was sent is looked at, and thrown away, by `heard`."""
+    """A connection; `heard` checks and returns what it was sent since the last call."""
 
-    def __init__(self, house, interface, host="127.0.0.1"):
-        self.house, self.interface = house, interface
+    def __init__(self, served, interface, host="127.0.0.1"):
+        self.served, self.interface = served, interface
         self.stream, self.sampled, self.rest = bytearray(), b"", b""
-        self.control = ConnectionControl(house.leases[host])
-        encoder = (house.encoders,) if interface == "rtde" else ()
-        self.session = INTERFACES[interface](house.robot, self.control, self.take, *encoder)
-        house.clients.append(self)
+        self.control = ConnectionControl(served.leases[host])
+        encoder = (served.encoders,) if interface == "rtde" else ()
+        self.session = INTERFACES[interface](served.robot, self.control, self.take, *encoder)
+        served.clients.append(self)
         self.session.opened()
 
     def take(self, data):
@@ -105,7 +105,7 @@ class Client:
         return data
 
     def go(self):
-        self.house.clients.remove(self)
+        self.served.clients.remove(self)
         self.session.closed()
 
 
@@ -175,9 +175,9 @@ def line(random):
 SENT = {"rtde": rtde, "primary": script, "realtime": script, "dashboard": line}
 
 
-def watch(house, reader, asker):
-    """A tick, at which those who do no wrong get what they wait for."""
-    snapshot = house.tick()
+def watch(served, reader, asker):
+    """Tick, and check that two well-behaved clients get their sample and their answer."""
+    snapshot = served.tick()
     found = rtde_client.decoded(reader.sampled, READ)
     assert found == {"timestamp": snapshot.timestamp, "actual_q": snapshot.actual_q}
     assert not reader.heard()
@@ -185,12 +185,12 @@ def watch(house, reader, asker):
     assert asker.heard().startswith(b"5.22")
 
 
-def attack(house, interface, random, packages):
-    """Clients that come, send so many packages, cut anywhere, and go."""
-    hosts = [*house.leases]
-    clients = [Client(house, interface, random.choice(hosts)) for _ in range(CLIENTS)]
-    reader, asker = Client(house, "rtde"), Client(house, "dashboard")
-    listener = Client(house, "primary")
+def attack(served, interface, random, packages):
+    """Let clients connect, send packages that are cut anywhere, and leave."""
+    hosts = [*served.leases]
+    clients = [Client(served, interface, random.choice(hosts)) for _ in range(CLIENTS)]
+    reader, asker = Client(served, "rtde"), Client(served, "dashboard")
+    listener = Client(served, "primary")
     for sent in (rtde_client.version(), rtde_client.outputs(READ), rtde_client.package("S")):
         reader.session.receive(sent)
     reader.heard()
@@ -206,20 +206,20 @@ def attack(house, interface, random, packages):
             client.rest = client.rest[cut:]
         client.heard()
         if random.random() < 0.3:
-            house.answer()
+            served.answer()
         if random.random() < 1 / LIVES:
             client.go()
-            clients[which] = Client(house, interface, random.choice(hosts))
+            clients[which] = Client(served, interface, random.choice(hosts))
         if number % 20 == 0:
-            watch(house, reader, asker)
+            watch(served, reader, asker)
             listener.heard()
     for client in (*clients, reader, listener, asker):
         client.go()
-    last = Client(house, "dashboard")
+    last = Client(served, "dashboard")
     last.session.receive(b"stop\n")
     last.go()
-    house.answer()
-    house.kinds.clear()  # the desk's own list, which would count as memory that is lost
+    served.answer()
+    served.kinds.clear()  # its own list, which would count as memory that is lost
 
 
 @pytest.mark.parametrize(
@@ -227,24 +227,25 @@ def attack(house, interface, random, packages):
 )
 @pytest.mark.parametrize("interface", INTERFACES)
 def test_random_bytes_break_no_interface_and_disturb_no_other_client(interface, packages):
-    house, random = House(), Random(packages)
-    house.host.tick()
-    house.tick()
+    served, random = ServedWithoutSockets(), Random(packages)
+    served.host.tick()
+    served.tick()
     memory, long = [], packages > 1000
     if long:
         tracemalloc.start(1)
         for _ in range(HISTORY):  # past postures are kept, which would count as memory that is lost
-            house.host.tick()
+            served.host.tick()
     try:
         for _ in range(8 if long else 2):
-            attack(house, interface, random, packages // (8 if long else 2))
-            gc.collect()
-            memory.append(tracemalloc.get_traced_memory()[0])
+            attack(served, interface, random, packages // (8 if long else 2))
+            if long:
+                gc.collect()
+                memory.append(tracemalloc.get_traced_memory()[0])
     finally:
         tracemalloc.stop()
-    assert house.holder() is None
-    assert not house.robot.inputs._owners
-    assert not house.clients
-    assert all(not lease._users for lease in house.leases.values())
+    assert served.holder() is None
+    assert not served.robot.inputs._owners
+    assert not served.clients
+    assert all(not lease._users for lease in served.leases.values())
     if long:  # in bytes; one sample alone may be larger by chance
         assert median(memory[4:]) - median(memory[:4]) < 200_000

@@ -67,7 +67,7 @@ def test_registers_are_taken_from_io(ur5e):
 
 
 def shaped(ur5e, io_changes=None):
-    """A robot in the middle of a shaped move, which is far from what was asked for."""
+    """Return a snapshot in a shaped move, far from the unshaped target."""
     robot = ur5e(q=ELBOW_UP, shaper="zv", io_changes=io_changes)
     robot.send(c.MoveJ, q=FAR)
     snapshot = robot.tick(150)
@@ -143,7 +143,7 @@ def test_energy_is_the_integral_of_power(snapshots):
 
 
 def held(ur5e, seconds, step=5.0):
-    """Temperatures of a robot that holds its payload out, looked at now and then."""
+    """Yield temperatures of a robot that holds its payload, every `step` seconds."""
     robot = ur5e()
     state = robot.tick().state
     for time in np.arange(step, seconds + step, step):

@@ -1,11 +1,10 @@
-"""The reference page of the interfaces matches the code."""
+"""The reference page of the interfaces matches the code; test_realtime.py has the layout of the real-time package."""
 
 import re
 from pathlib import Path
 
 from tvist_server.gateways.ur.dashboard import COMMANDS
 from tvist_server.gateways.ur.primary.packages import robot_state
-from tvist_server.gateways.ur.realtime import LAYOUT
 
 from .decoders import parts, split
 
@@ -26,12 +25,3 @@ def test_the_documented_lengths_of_the_robot_state_are_right(snapshot, robot):
     ((_, body),) = split(robot_state(robot.description, snapshot))
     said = {row[0]: row[1] for row in ROWS if len(row) == 5 and row[0].isdecimal()}
     assert said == {str(number): str(5 + len(part)) for number, part in parts(body)}
-
-
-def test_the_documented_layout_of_the_real_time_package_is_right():
-    wanted, at = [], 0
-    for name, count in LAYOUT:
-        span = str(at) if count == 1 else f"{at}–{at + count - 1}"
-        wanted.append(f"{span} reserved" if name is None else f"{span} `{name}`")
-        at += count
-    assert " ".join(PAGE.split()).endswith(f": {', '.join(wanted)}.")

@@ -14,8 +14,8 @@ from tvist_server.gateways.ur.interpreter import LONGEST, InterpreterSession
 from tvist_server.gateways.ur.programs import Programs
 
 from .conftest import FakeControl, io
-from .desks import PATIENCE, connect, lines, until
 from .hosts import LineClient, external
+from .served_controller import PATIENCE, connect, lines, until
 
 
 @pytest.fixture
@@ -114,22 +114,22 @@ def test_random_bytes_do_not_break_a_session(data, cut):
     assert all(line.decode().isprintable() for line in b"".join(client.sent).split(b"\n"))
 
 
-async def test_statements_run_one_by_one_and_errors_have_their_number(desk):
-    listener, script = await connect(desk, "primary")
+async def test_statements_run_one_by_one_and_errors_have_their_number(served):
+    listener, script = await connect(served, "primary")
     script.write(b"def main():\n  a = 5\n  interpreter_mode()\nend\n")
-    await until(lambda: desk.controller.programs.state == "PLAYING")
-    await desk.tick(2)
-    reader, writer = await connect(desk, "interpreter")
+    await until(lambda: served.controller.programs.state == "PLAYING")
+    await served.tick(2)
+    reader, writer = await connect(served, "interpreter")
     assert await lines(reader, writer, "write_output_integer_register(3, a + 1)", "nothing()") == [
         "ack: 1: write_output_integer_register(3, a + 1)",
         "discard: Compile error: column 1, compile_error_name_not_found:nothing:: nothing()",
     ]
-    await desk.tick(2)
-    assert desk.interfaces.robot.latest.output_int_register_3 == 6
+    await served.tick(2)
+    assert served.interfaces.robot.latest.output_int_register_3 == 6
     asked = ("statelastexecuted", "a = [1] b = a[4]")
     assert await lines(reader, writer, *asked) == [f"state: 1: {asked[0]}", f"ack: 2: {asked[1]}"]
-    await desk.tick(3)
-    assert desk.controller.programs.state == "STOPPED"
+    await served.tick(3)
+    assert served.controller.programs.state == "STOPPED"
     assert (await lines(reader, writer, "b = 1"))[0].startswith("discard: Program is in an invalid state: ")
     seen = b""
     async with asyncio.timeout(PATIENCE):

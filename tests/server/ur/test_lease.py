@@ -6,17 +6,17 @@ from tvist_protocol import commands as c
 from tvist_protocol.replies import Done
 from tvist_server.gateways.ur.lease import ConnectionControl, HostLease
 
-from .desks import ControllerThread
 from .hosts import hear
+from .served_controller import ControllerThread
 
 
 class Host:
     """Connections of one host to a controller, whose replies come with `answer`."""
 
     def __init__(self):
-        self.desk, self.replies = ControllerThread(late=True), []
-        self.answer, self.kinds = self.desk.answer, self.desk.kinds
-        self.lease = HostLease(self.desk, "127.0.0.1", lambda action: action())
+        self.served, self.replies = ControllerThread(late=True), []
+        self.answer, self.kinds = self.served.answer, self.served.kinds
+        self.lease = HostLease(self.served, "127.0.0.1", lambda action: action())
         self.connection, self.other = ConnectionControl(self.lease), ConnectionControl(self.lease)
 
     def slow(self, fraction, connection=None):
@@ -26,8 +26,8 @@ class Host:
         hear(command, self.replies)
 
     def taken_by(self, client):
-        """Control for a client that reaches the controller directly: its token."""
-        return self.desk.controller.receive(c.TakeControl(client=client)).token
+        """Take control for a client outside the interfaces; return its token."""
+        return self.served.controller.receive(c.TakeControl(client=client)).token
 
 
 @pytest.fixture
@@ -39,17 +39,17 @@ def test_control_lasts_from_the_first_change_to_the_last_connection(host):
     watcher = ConnectionControl(host.lease)
     hear(watcher.ask(c.Stop()), host.replies)
     host.answer()
-    assert host.desk.holder() is None
+    assert host.served.holder() is None
     for connection in (host.connection, host.connection, host.other):
         host.slow(0.5, connection)
     host.answer()
     assert host.replies == [Done()] * 4
     assert host.kinds.count("TakeControl") == 1
     for leaving, holder in ((watcher, "ur-127.0.0.1"), (host.connection, "ur-127.0.0.1"), (host.other, None)):
-        assert host.desk.holder() == "ur-127.0.0.1"
+        assert host.served.holder() == "ur-127.0.0.1"
         leaving.leave()
         host.answer()
-        assert host.desk.holder() == holder
+        assert host.served.holder() == holder
 
 
 def test_commands_sent_while_control_is_taken_keep_their_order(host):
@@ -57,7 +57,7 @@ def test_commands_sent_while_control_is_taken_keep_their_order(host):
         host.slow(fraction)
     host.answer()
     assert host.kinds == ["TakeControl", "SetSpeed", "SetSpeed", "SetSpeed"]
-    assert host.desk.controller.io().target_speed_fraction == 0.3
+    assert host.served.controller.io().target_speed_fraction == 0.3
 
 
 def test_commands_are_refused_while_another_client_has_control(host):
@@ -67,7 +67,7 @@ def test_commands_are_refused_while_another_client_has_control(host):
         host.slow(0.5)
         host.answer()
     assert [(reply.code, "anna" in reply.why) for reply in host.replies] == [("no_control", True)] * 2
-    host.desk.controller.receive(c.ReleaseControl(token=token))
+    host.served.controller.receive(c.ReleaseControl(token=token))
     assert not host.connection.held_by_other
     host.slow(0.5)
     host.answer()
@@ -78,7 +78,7 @@ def test_lost_control_is_taken_again(host):
     for fraction in (0.5, 0.4):
         host.slow(fraction)
         host.answer()
-        host.desk.controller.session.release()
+        host.served.controller.session.release()
     assert host.replies == [Done(), Done()]
     assert host.kinds == ["TakeControl", "SetSpeed", "SetSpeed", "TakeControl", "SetSpeed"]
 
@@ -102,4 +102,4 @@ def test_an_adopted_lease_is_shared_and_not_released(host):
     assert "TakeControl" not in host.kinds
     host.connection.leave()
     host.answer()
-    assert host.desk.controller.session.lease.token == token
+    assert host.served.controller.session.lease.token == token

@@ -64,8 +64,7 @@ def test_flags_show_power_protective_stop_and_paused_program(ur5e):
     assert off[15] == 3
     stopped = ur5e()
     stopped.send(SimulationInject, fault="protective_stop")
-    part = state_of(stopped.tick(50))[0][0]
-    assert flags(part)[4:] == (True, False, False)
+    assert flags(state_of(stopped.tick(50))[0][0])[4:] == (True, False, False)
     for program, told_as in {"STOPPED": (0, 0), "PLAYING": (1, 0), "PAUSED": (0, 1)}.items():
         resting = ur5e(io_changes={"program": "f", "program_state": program})
         assert flags(state_of(resting.tick())[0][0])[5:] == told_as
@@ -129,7 +128,7 @@ def test_an_arm_with_fewer_joints_fills_the_same_package(ur5e):
 
 
 class At:
-    """A snapshot with another number of its tick, and other values."""
+    """A snapshot with another tick and changed values."""
 
     def __init__(self, snapshot, tick, **changes):
         self._snapshot, self._changes = snapshot, changes
@@ -283,7 +282,7 @@ PROGRAMS = ("movej([0,0,0,0,0,0])\n", PROGRAM, "sec f():\nend\n", "power onto\n"
 
 
 def test_own_commands_act_and_other_text_runs_as_a_program(robot, control, sent):
-    """A simulated arm stays one."""
+    """`set sim` and `set real` change nothing."""
     interface, expected = session(robot, control, sent.append), []
     for text, commands in ORDERS.items():
         interface.receive(text.encode() + b"\r\n")

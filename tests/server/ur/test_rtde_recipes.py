@@ -36,7 +36,7 @@ BANKS = {
 
 
 def alone(names, snapshot, head=b"\x01"):
-    """The package for a client that is the only one."""
+    """Return the package for a client that is alone."""
     board, recipe = PackageEncoder(), OutputRecipe(tuple(names))
     board.begin("client", recipe)
     return board.package(recipe, snapshot, head)
@@ -66,7 +66,7 @@ def test_variables_have_their_published_types():
 @given(names_of_outputs)
 @example(names=sorted(client.OUTPUT_TYPES))
 def test_a_package_has_the_values_of_the_snapshot(snapshots, names):
-    """Also of all variables at once, whose names are longer than the 2048 bytes that are documented."""
+    """The example has all variables, whose names exceed UR's documented 2048 bytes."""
     snapshot = snapshots[17]
     recipe = OutputRecipe(tuple(names))
     assert recipe.valid
@@ -74,8 +74,7 @@ def test_a_package_has_the_values_of_the_snapshot(snapshots, names):
     found = client.decoded(alone(names, snapshot), names)
     for name, value in found.items():
         assert value == getattr(snapshot, name), name
-    bare = client.decoded(alone(names, snapshot, b""), names, version=1)
-    assert bare == found
+    assert client.decoded(alone(names, snapshot, b""), names, version=1) == found
 
 
 @examples(40)

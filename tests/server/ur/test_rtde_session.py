@@ -26,7 +26,7 @@ doubles = [f"input_double_register_{k}" for k in range(48)]
 
 
 class Client:
-    """A connection seen from its other end."""
+    """The client's end of a connection."""
 
     def __init__(self, robot, control):
         self.control = control
@@ -35,7 +35,7 @@ class Client:
         self.session.opened()
 
     def say(self, *packages):
-        """The answers to these packages."""
+        """Send packages; return the answers."""
         self.session.receive(b"".join(packages))
         return self.heard()
 
@@ -54,7 +54,7 @@ class Client:
         return self
 
     def with_inputs(self, *recipes):
-        """A connection that has asked for these input recipes."""
+        """Set up input recipes."""
         self.say(client.version())
         for number, names in enumerate(recipes, 1):
             types = ",".join(client.INPUT_TYPES[name] for name in names).encode()

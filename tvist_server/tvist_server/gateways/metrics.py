@@ -21,7 +21,6 @@ else:
     Collector = object  # the library is imported when figures are requested
 
 LABELS = ("namespace", "robot")
-MICRO = 1e-6
 
 
 class MetricsGateway(Gateway):
@@ -67,7 +66,10 @@ class Metrics(Collector):
         try:
             self._server, self._thread = start_http_server(port, host, registry)
         except (OSError, socket.gaierror) as error:
-            raise GatewayError(f"cannot publish metrics on {address}: {error.strerror or error}") from error
+            why = error.strerror or error
+            raise GatewayError(
+                f"cannot publish metrics on {address}: {why}; give another port or address"
+            ) from error
         self.page = f"http://{f'[{host}]' if ':' in host else host}:{self._server.server_port}/metrics"
         """URL of the page with the figures."""
 
@@ -105,7 +107,7 @@ def _figures() -> Iterator[Figure]:
         for kind, field, what in figures:
             yield kind, NAMES.get(field, field), what, "", partial(_fields, source, {"": field}, 1.0)
     what = "Lateness of the ticks of the last second, by `quantile`: 0.5, 0.99, and 1 for the largest."
-    lateness = partial(_fields, "telemetry", QUANTILES, MICRO)
+    lateness = partial(_fields, "telemetry", QUANTILES, 1e-6)
     yield "gauge", "tick_lateness_seconds", what, "quantile", lateness
     yield "counter", "events", "Events, by `kind`.", "kind", lambda robot: robot.events.copy()
     what = "Warnings, by `code`, which is empty for those without one."

@@ -47,7 +47,7 @@ def start_router(
     security: str | None,
     insecure: bool,
 ) -> zenoh.Session:
-    """Start a router; `rates` limit the outgoing states of each robot in `robots`, and of all others together.
+    """Start a router; `rates` limit the outgoing states of each robot in `robots`, or of all if it is empty.
 
     May raise StartError or GatewayError.
     """
@@ -72,22 +72,18 @@ def robots_of(text: str) -> list[RobotPlace]:
 def downsampling(rates: Sequence[Rate], robots: Sequence[RobotPlace]) -> list[dict[str, Any]]:
     """Return Zenoh's `downsampling` settings for what leaves the router.
 
-    Zenoh counts per rule, not per key: under a wildcard, one robot could use up the rate of all. Listed
-    robots therefore have rules of their own, which come first.
+    Zenoh counts per rule, not per key, and if several rules match a key, it takes any one of them. So
+    there is no rule for all robots beside those of the listed ones, which might then share its rate.
     """
-    places = [
-        *(keys.within(place.namespace, f"{keys.PREFIX}/{place.robot}") for place in robots),
-        keys.ANYWHERE,
-    ]
+    listed = {keys.within(place.namespace, f"{keys.PREFIX}/{place.robot}") for place in robots}
+    rules = [f"{place}/{leaf}" for place in sorted(listed) or [keys.ANYWHERE] for leaf in REDUCED]
     return [
         {
             "id": f"rate {number}",
             **({"interfaces": [rate.interface]} if rate.interface else {}),
             "messages": ["put"],
             "flows": ["egress"],
-            "rules": [
-                {"key_expr": f"{place}/{leaf}", "freq": rate.hz} for place in places for leaf in REDUCED
-            ],
+            "rules": [{"key_expr": rule, "freq": rate.hz} for rule in rules],
         }
         for number, rate in enumerate(rates)
     ]

@@ -100,8 +100,10 @@ def version_trouble(version: Sequence[int]) -> str | None:
     least = LEAST_MINOR.get(major, 0 if major > max(LEAST_MINOR) else None)
     if least is not None and minor >= least:
         return None
-    own = f"{major}.{minor}"
-    return f"its software {own} may not run tvist's program: update it to 5.9 or later, on a CB3 robot to 3.14 or later"
+    return (
+        f"its software {major}.{minor} may not run tvist's program: update it to 5.9 or later, on a CB3 robot to 3.14 "
+        "or later"
+    )
 
 
 def why_not_by_state(expected: Expected, sight: Sight, *, may_play: bool = False) -> str | None:

@@ -53,7 +53,7 @@ class MovedRobot(RealArm):
     ) -> None:
         self._robot = WatchedRobot(place, description, payload, OUTPUTS, INPUTS)
         self._place = place
-        self._sight = self._robot.first()
+        self._sight = self._robot.last
         self._told = [f"no joint moves faster than {speed_cap:g} rad/s (--speed-cap)"]
         own = configuration_of(place)
         answers = query_dashboard(place, QUESTIONS)

@@ -117,9 +117,7 @@ class Moves:
                 duration = f", t={_number(value)}"
             else:
                 raise UnknownPartError(f"a waypoint's {name}")
-        self._text.label(node, self._name(node))
-        if style.tcp:
-            self._text.line(style.tcp)
+        self._text.label(node, self._name(node), *filter(None, [style.tcp]))
         if near and place != near:
             place = f"pose_trans({place}, get_tcp_offset())" if style.flange else place
             place = f"get_inverse_kin({place}, qnear={near})" if style.kind == "MoveJ" else place
@@ -191,8 +189,7 @@ class Moves:
             (_number(end.findtext("Distance")) for end in ends if end.get("type") == "DISTANCE"), repr(_FAR)
         )
         self.has_directions = True
-        text.label(node, f"Direction: {shown} {axis}".rstrip())
-        text.line(f"global move_state_{number}=0")
+        text.label(node, f"Direction: {shown} {axis}".rstrip(), f"global move_state_{number}=0")
         with text.block(f"thread move_{number}():"):
             text.line("enter_critical", f"move_state_{number} = 1")
             text.line(f"local ahead=point_towards({frame}, {direction}, {far})")

@@ -51,11 +51,12 @@ class Nodes:
         )
         self._kinds: dict[str, Callable[[Element], object]] = {
             "Placeholder": lambda _: None, "SubProgram": lambda _: None,  # defined before the program
-            "Folder": self._folder, "Comment": self._comment, "Script": self._script, "Wait": self._wait,
-            "Halt": self._halt, "Popup": self._popup, "Assignment": self._assignment, "If": self._if,
-            "Loop": self._loop, "Switch": self._switch, "Set": self._set, "Force": self._force,
-            "CallSubProgram": self._call, "Contributed": self._contributed, "Move": moves.move,
-            "Waypoint": moves.waypoint, "CircleMove": moves.circle, DIRECTION: moves.direction,
+            "Halt": lambda node: self.text.label(node, "Halt", "halt"), "Folder": self._folder,
+            "Comment": self._comment, "Script": self._script, "Wait": self._wait,
+            "Popup": self._popup, "Assignment": self._assignment, "If": self._if, "Loop": self._loop,
+            "Switch": self._switch, "Set": self._set, "Force": self._force, "CallSubProgram": self._call,
+            "Contributed": self._contributed, "Move": moves.move, "Waypoint": moves.waypoint,
+            "CircleMove": moves.circle, DIRECTION: moves.direction,
         }  # fmt: skip
 
     def children(self, node: Element) -> None:
@@ -90,28 +91,21 @@ class Nodes:
         words = " ".join((node.get("comment") or "").split())
         self.text.label(node, f"'{words}'")
 
-    def _halt(self, node: Element) -> None:
-        self.text.label(node, "Halt")
-        self.text.line("halt")
-
     def _script(self, node: Element) -> None:
         if node.find("./expression/*") is not None:
-            self.text.label(node, self.expressions.label(node))
-            self.text.line(self.expressions.text(node))
+            self.text.label(node, self.expressions.label(node), self.expressions.text(node))
             return
         content = node.findtext("cachedContents") or node.findtext("text") or node.text or ""
         if not content.strip():
             raise UnknownPartError("a Script without text")
         file = (node.findtext("file") or "").rpartition("/")[2]
-        self.text.label(node, f"Script: {file}")
-        self.text.line(content.rstrip("\n"))
+        self.text.label(node, f"Script: {file}", content.rstrip("\n"))
 
     def _wait(self, node: Element) -> None:
         match node.get("type"):
             case "Sleep":
                 seconds = repr(numbers(node.findtext("waitTime"), 1)[0])
-                self.text.label(node, f"Wait: {seconds}")
-                self.text.line(f"sleep({seconds})")
+                self.text.label(node, f"Wait: {seconds}", f"sleep({seconds})")
                 return
             case "Condition":
                 shown, condition = self.expressions.label(node), self.expressions.text(node)
@@ -127,18 +121,17 @@ class Nodes:
         if (kind := node.get("type") or "") not in _POPUPS:
             _refuse(node)
         message = " ".join((node.get("message") or "").replace('"', "'").split())
-        self.text.label(node, f"Popup: {message}")
-        self.text.line(f'popup("{message}", "{kind}", {_POPUPS[kind]}, blocking=True)')
-        if node.get("haltProgram") == "true":
-            self.text.line("halt")
+        call = f'popup("{message}", "{kind}", {_POPUPS[kind]}, blocking=True)'
+        halt = ["halt"] if node.get("haltProgram") == "true" else []
+        self.text.label(node, f"Popup: {message}", call, *halt)
 
     def _assignment(self, node: Element) -> None:
         name = self.expressions.variable(node.find("variable"))
         source = node.get("valueSource") or "Expression"
         if source != "Expression":
             raise UnknownPartError(f"Assignment ({source})")
-        self.text.label(node, f"{name}≔{self.expressions.label(node)}")
-        self.text.line(f"global {name}={self.expressions.text(node)}")
+        shown = f"{name}≔{self.expressions.label(node)}"
+        self.text.label(node, shown, f"global {name}={self.expressions.text(node)}")
 
     def _if(self, node: Element) -> None:
         if node.get("checkContinuously") == "true":
@@ -161,8 +154,7 @@ class Nodes:
             case "Counting":
                 count = int(numbers(node.get("count"), 1)[0])
                 name = self.expressions.variable(node.find("loopVariable"))
-                self.text.label(node, f"Loop {count} times")
-                self.text.line(f"{name} = 0")
+                self.text.label(node, f"Loop {count} times", f"{name} = 0")
                 with self.text.block(f"while ({name} < {count}):"):
                     self.children(node)
                     self.text.line(f"{name} = {name} + 1")
@@ -188,10 +180,9 @@ class Nodes:
             self.text.line(f"kill thread_handler_{number}")
 
     def _switch(self, node: Element) -> None:
-        self.text.label(node, f"Switch {self.expressions.label(node)}")
         self._switches += 1
-        name = f"switch_{self._switches}"
-        self.text.line(f"{name} = {self.expressions.text(node)}")
+        name, shown = f"switch_{self._switches}", self.expressions.label(node)
+        self.text.label(node, f"Switch {shown}", f"{name} = {self.expressions.text(node)}")
         cases = [case for case in children_of(node) if case.tag == "Case"]
         for place, case in enumerate(cases):
             value = case.get("caseValue") or ""
@@ -207,8 +198,7 @@ class Nodes:
         name = "" if target is None else target.get("name") or ""
         if not name:
             raise UnknownPartError("a call of a sub-program that is not in the file")
-        self.text.label(node, f"Call {script_name(name)}")
-        self.text.line(f"{script_name(name)}()")
+        self.text.label(node, f"Call {script_name(name)}", f"{script_name(name)}()")
 
     # ------------------------------------------------------------------ robot
 
@@ -219,8 +209,8 @@ class Nodes:
             case "DigitalOutput":
                 function, number, shown = self.expressions.output(node.find("pin"))
                 on = node.findtext("digitalValue") in {"1", "true"}
-                self.text.label(node, f"Set {shown}={'On' if on else 'Off'}")
-                self.text.line(f"{function}({number}, {on})")
+                title = f"Set {shown}={'On' if on else 'Off'}"
+                self.text.label(node, title, f"{function}({number}, {on})")
             case other:
                 raise UnknownPartError(f"Set ({other or 'without a type'})")
 
@@ -237,10 +227,9 @@ class Nodes:
             force if axis else motion
             for axis, force, motion in zip(chosen, parts["limitsForce"], parts["limitsMotion"], strict=True)
         ]
-        self.text.label(node, "Force")
-        self.text.line("sleep(0.02)", "zero_ftsensor()")
         frame = "tool_pose()" if name == "Tool" else frame
-        self.text.line(f"force_mode({frame}, {chosen}, {list(parts['wrench'])}, 2, {limits})")
+        call = f"force_mode({frame}, {chosen}, {list(parts['wrench'])}, 2, {limits})"
+        self.text.label(node, "Force", "sleep(0.02)", "zero_ftsensor()", call)
         self.children(node)
         self.text.line("end_force_mode()", "stopl(5.0)")
 
@@ -250,8 +239,7 @@ class Nodes:
         if kind in self._skip or node.get("strategyURCapName") in self._skip:
             return
         if (lines := contributed.lines_of(node)) is not None:
-            self.text.label(node, title)
-            self.text.line(*lines)
+            self.text.label(node, title, *lines)
         elif (branch := contributed.branch_of(node)) is None:
             raise UnknownPartError(kind)
         elif not branch:

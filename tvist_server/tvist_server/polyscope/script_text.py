@@ -19,10 +19,10 @@ class ScriptText:
         indent = "  " * self._depth
         self._lines += [indent + part for line in lines for part in line.split("\n")]
 
-    def label(self, node: Element, title: str) -> None:
-        """Add the label of a node."""
+    def label(self, node: Element, title: str, *lines: str) -> None:
+        """Add the label of a node, and lines behind it."""
         plain = "".join(c for c in title.replace('"', "'") if c.isprintable())
-        self.line(f'$ {self.numbers[node]} "{plain}"')
+        self.line(f'$ {self.numbers[node]} "{plain}"', *lines)
 
     @contextmanager
     def block(self, head: str, end: str = "end") -> Iterator[None]:

@@ -107,8 +107,7 @@ class RowCount:
         self._own: int | None = None
         self._offset, self._heard, self._ahead = 0, 0.0, 0.0
         self.tick = 0  # number of the last row; 0 before the first
-        self.rows = self.missing = self.doubled = 0
-        """Numbers of rows taken, missing, and ignored as duplicates since the first one."""
+        self.rows = self.missing = 0  # numbers of rows taken and missing since the first one
 
     def take(self, timestamp: float, now: float, *, reconnected: bool = False) -> Counted | None:
         """Take a row at the robot's and the local time [s]; return None if it repeats the last one.
@@ -118,7 +117,6 @@ class RowCount:
         """
         own, before = round(timestamp / PERIOD), self._own
         if own == before:
-            self.doubled += 1
             return None
         missing, anew, ahead = 0, False, timestamp - now
         if before is not None and not reconnected:

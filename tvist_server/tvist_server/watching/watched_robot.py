@@ -66,15 +66,11 @@ class WatchedRobot(RealArm):
             raise PlantError(f"{error}. {_NEXT}") from error
 
     def measure(self) -> Measurement:
-        return self._last.measured
+        return self.last.measured
 
     def step(self, command: DriveCommand) -> Measurement:
         del command
-        return self._last.measured
-
-    def first(self) -> Sight:
-        """Return the last row from before the first tick."""
-        return self._last
+        return self.last.measured
 
     def interval(self) -> float:
         return self._interval * PERIOD
@@ -83,8 +79,8 @@ class WatchedRobot(RealArm):
         """Return the next row."""
         if not self._sights:
             raise PlantError(f"the robot at {self._place} has sent no new row")
-        self._last, self.newest = self._sights.popleft()
-        return self._last
+        self.last, self.newest = self._sights.popleft()
+        return self.last
 
     def wait(self, timeout: float) -> bool:
         """Wait for the next row, at most for `timeout` [s]; connect if there is no connection."""
@@ -142,7 +138,7 @@ class WatchedRobot(RealArm):
                 "be watched"
             )
         self._count = RowCount(self._interval)
-        self._last, self.newest = self._sight(rows[-1], 0), rows[-1]
+        self.last, self.newest = self._sight(rows[-1], 0), rows[-1]
         software = ".".join(map(str, self.version[:3]))
         rate, done = INTERVALS[self._interval], "moved" if self._inputs else "watched"
         self._notes.append(
@@ -161,12 +157,9 @@ class WatchedRobot(RealArm):
             self._notes.append(f"its software does not report {', '.join(lacking)}")
 
     def _connect(self) -> None:
-        self._connection, self._checked = self._new_connection(), False
-        self._client = self._connection.client
-
-    def _new_connection(self) -> RtdeConnection:
         client = RtdeClient(self._needed, OPTIONAL, self._inputs)
-        return RtdeConnection(self._place, self._address, client)
+        self._connection, self._checked = RtdeConnection(self._place, self._address, client), False
+        self._client = self._connection.client
 
     def _rows(self, timeout: float) -> list[Row]:
         """Return the rows that have come, and keep the robot's messages."""
@@ -240,7 +233,7 @@ class WatchedRobot(RealArm):
         if why == before or (before and isinstance(error, UnreachableError)):
             return
         self._lost = (since if before else now), why
-        latest, row = self._sights[-1] if self._sights else (self._last, self.newest)
+        latest, row = self._sights[-1] if self._sights else (self.last, self.newest)
         modes = int(RobotMode.DISCONNECTED), int(SafetyMode.UNDEFINED), int(RuntimeState.STOPPED)
         told = (*self._notes, f"{why}; the state stands still, and a connection is attempted every second")
         self._notes = []

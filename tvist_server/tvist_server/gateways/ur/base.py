@@ -12,6 +12,9 @@ from tvist_server.gateways.ur.deferred import begin
 from tvist_server.gateways.ur.lease import ConnectionControl
 from tvist_server.gateways.ur.robot import UrRobot
 
+MAX_COMMANDS = 32
+"""Number of a client's unanswered commands at which reading pauses, since one tick carries all of them out."""
+
 Send = Callable[[bytes], None]  # sends an answer, which is never dropped
 Item = TypeVar("Item")
 
@@ -28,10 +31,12 @@ class PortSession(ABC):
     """Whether the client gets nothing that it has not requested, so that it may be disconnected to make room."""
     served = False
     """Whether the client is being sent what it requested; it may then be silent, but has to read."""
+    most_waiting = MAX_COMMANDS
+    """Number of waiting requests at which reading pauses."""
 
     @property
     def waiting(self) -> int:
-        """Number of received requests without an answer; many of them pause reading."""
+        """Number of received requests without an answer."""
         return 0
 
     def opened(self) -> None:  # noqa: B027  not every session has to

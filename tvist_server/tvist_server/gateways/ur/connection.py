@@ -14,15 +14,13 @@ from tvist_controller.instruments.snapshot import Snapshot
 from tvist_protocol.stream import Event
 from tvist_server.allowed_hosts import ip_of
 from tvist_server.gateways.base import GatewayError
-from tvist_server.gateways.ur.base import PortSession, Send
+from tvist_server.gateways.ur.base import MAX_COMMANDS, PortSession, Send
 from tvist_server.gateways.ur.lease import ConnectionControl, HostLease
 from tvist_server.ur_ports import InterfaceName
 
 log = logging.getLogger(__name__)
 
 PIECE = 256  # bytes read from a client at a time, so that a flood does not delay the others
-MAX_COMMANDS = 32
-"""Largest number of a client's unanswered commands; more pause reading, because one tick carries all of them out."""
 MAX_UNREAD = 1_000_000  # unread bytes at which a client is disconnected
 HEARS = MAX_UNREAD // 4  # in real time, unread bytes above which a client misses messages to all clients
 ANSWERS = MAX_UNREAD // 2  # in real time, unread bytes above which reading from a client pauses
@@ -48,16 +46,13 @@ REASONS = {
     errno.EACCES: "that is not permitted: choose a port above 1023",
 }
 
-MakeSession = Callable[[ConnectionControl, Send], PortSession]
-"""Creates an interface's session from its access to the controller and its send function."""
-
 
 class ClientConnection(asyncio.BufferedProtocol):
     """One client at one interface; if it is lossless (lockstep), samples wait for a slow client."""
 
     def __init__(
         self,
-        make: MakeSession,
+        make: Callable[[ConnectionControl, Send], PortSession],  # makes the session
         lease: Callable[[str], HostLease],
         limit: "ConnectionLimit",
         *,
@@ -123,9 +118,10 @@ class ClientConnection(asyncio.BufferedProtocol):
         """Pause or resume reading, or close the connection if its session is over."""
         if self._transport.is_closing():
             return
-        if self.session.over:
+        session, commands = self.session, self._control.unanswered
+        if session.over:
             self._transport.close()
-        elif self._behind or self._control.unanswered + self.session.waiting >= MAX_COMMANDS:
+        elif self._behind or commands >= MAX_COMMANDS or session.waiting >= session.most_waiting:
             self._transport.pause_reading()
         else:
             self._transport.resume_reading()

@@ -217,9 +217,10 @@ def find(line: str) -> tuple[Command, str] | None:
 
 @dataclass(eq=False)
 class DashboardSession(InTurnSession[str]):
-    """One client of the dashboard."""
+    """One client of the dashboard. Answers keep their order, but a `stop` takes effect when it is read."""
 
     client_begins = True
+    most_waiting = 256  # lines, so that a `stop` behind fewer is read; they take up to 1 MB
     _lines: LineSplitter = field(default_factory=partial(LineSplitter, LONGEST), init=False)
     _rests: Deferred[bool] | None = field(default=None, init=False)  # waits for the arm to rest
     _last: int = field(default=0, init=False)  # tick at which this wait ends

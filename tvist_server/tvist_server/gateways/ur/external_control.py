@@ -14,16 +14,16 @@ from tvist_server.program_folder import ProgramFolder
 FILE: Final = "external_control.urp"  # built-in program that consists of the node alone
 ALONE: Final = program_text("external_control", EXTERNAL_CONTROL)
 
-Fetch = Callable[[str], Awaitable[str | None]]
-"""Requests a machine's part of the program; returns None if it does not answer."""
-Aside = Callable[[Callable[[], str | None]], Awaitable[str | None]]
-"""Reads a text in another thread, because the calling thread serves all clients."""
-
 
 class ExternalControl:
-    """Completes such programs; `folder` has those that clients load by name."""
+    """Completes such programs."""
 
-    def __init__(self, folder: ProgramFolder, fetch: Fetch, aside: Aside) -> None:
+    def __init__(
+        self,
+        folder: ProgramFolder,  # programs that clients load by name
+        fetch: Callable[[str], Awaitable[str | None]],  # gets a machine's part; None: no answer
+        aside: Callable[[Callable[[], str | None]], Awaitable[str | None]],  # reads in another thread
+    ) -> None:
         self._folder, self._fetch, self._aside = folder, fetch, aside
 
     async def find(self, name: str) -> str | None:

@@ -46,6 +46,17 @@ MOST_LINES = 10  # largest number of lines of each kind on the console, in each 
 PAUSE = 0.02  # time between two checks for room in lockstep [s]
 UNREAD = 10
 """States handed over together while there is no client; only temperatures and energies need them then."""
+_SESSIONS: Mapping[InterfaceName, Callable[[UrRobot, ConnectionControl, Send], PortSession]] = {
+    "dashboard": DashboardSession,
+    "interpreter": InterpreterSession,
+    "primary": PrimarySession,
+    "primary_read_only": partial(PrimarySession, read_only=True),
+    "secondary": partial(PrimarySession, informed=False),
+    "secondary_read_only": partial(PrimarySession, informed=False, read_only=True),
+    "realtime": RealtimeSession,
+    "realtime_read_only": partial(RealtimeSession, read_only=True),
+}
+"""Sessions that need nothing of the interfaces."""
 
 
 class UrInterfaces(Gateway):
@@ -236,21 +247,13 @@ class UrInterfaces(Gateway):
 
     def _session(self, interface: InterfaceName, control: ConnectionControl, send: Send) -> PortSession:
         self._handle_queue()  # the client must see the robot's present state
-        robot, read_only = self.robot, interface.endswith("read_only")
         match interface:
             case "gripper":
                 assert self._gripper is not None
-                return GripperSession(robot, control, send, self._gripper, self._soon)
+                return GripperSession(self.robot, control, send, self._gripper, self._soon)
             case "rtde":
-                return RtdeSession(robot, control, send, self._encoders)
-            case "dashboard":
-                return DashboardSession(robot, control, send)
-            case "interpreter":
-                return InterpreterSession(robot, control, send)
-            case "realtime" | "realtime_read_only":
-                return RealtimeSession(robot, control, send, read_only=read_only)
-        informed = interface.startswith("primary")
-        return PrimarySession(robot, control, send, read_only=read_only, informed=informed)
+                return RtdeSession(self.robot, control, send, self._encoders)
+        return _SESSIONS[interface](self.robot, control, send)
 
     def _lease(self, host: str) -> HostLease:
         lease = self._leases.get(host)

@@ -24,8 +24,7 @@ def stamp(tick: Snapshot | None) -> int:
 def version() -> bytes:
     """Encode the software version, the first message that a client gets."""
     name = b"URControl"
-    body = bytes([len(name)]) + name + pack(">BBii", *VERSION) + _text(DATE)
-    return _message(None, 3, body)
+    return _message(None, 3, bytes([len(name)]) + name + pack(">BBii", *VERSION) + _text(DATE))
 
 
 def text(tick: Snapshot | None, what: str) -> bytes:

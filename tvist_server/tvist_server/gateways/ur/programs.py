@@ -157,7 +157,8 @@ class Programs:
         self.interpreter = io.interpreter or Interpreter()
 
     def event(self, event: Event) -> None:
-        now, why, title = self._host.latest, event.why or "", _title(event.program or "")
+        now, why = self._host.latest, event.why or ""
+        title = (event.program or "").removesuffix(".urp").removesuffix(".script")
         match event.kind:
             case "program_started" | "program_stopped" if event.secondary:
                 self._count_secondary(started=event.kind == "program_started")
@@ -215,9 +216,3 @@ class Programs:
 def _path_of(name: str) -> str:
     """Return the path reported to clients: a file's path, or only the name of a script."""
     return f"{FOLDER}/{name}" if name.endswith(_SAVED) else name
-
-
-def _title(name: str) -> str:
-    for ending in _SAVED:
-        name = name.removesuffix(ending)
-    return name

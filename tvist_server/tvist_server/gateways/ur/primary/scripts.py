@@ -33,12 +33,6 @@ class Unit:
         return " ".join(word for line in self.text.split("\n") for word in _code(line).split())
 
     @property
-    def name(self) -> str | None:
-        """Name of the program that it defines; None if it defines none."""
-        head = _HEAD.match(self._first)
-        return None if head is None else head[2]
-
-    @property
     def secondary(self) -> bool:
         """Whether it is a secondary program, which runs beside the main one."""
         head = _HEAD.match(self._first)
@@ -47,7 +41,8 @@ class Unit:
     @property
     def title(self) -> str:
         """Title for messages: the name of the program that it defines, or its first line of code."""
-        title = self.name or self._first
+        head = _HEAD.match(self._first)
+        title = self._first if head is None else head[2]
         if len(title) > TITLE:
             title = f"{title[: TITLE - 1]}…"
         return "".join([letter if letter.isprintable() else "?" for letter in title])

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from fnmatch import fnmatchcase
+from functools import partial
 from operator import attrgetter
 from typing import Any, NamedTuple, get_args
 
@@ -99,14 +100,10 @@ class OutputSource(NamedTuple):
     of_io: bool = False  # whether its values depend only on terminals and registers, which rarely change
 
 
-def _single_bits(bank: str) -> Callable[[Snapshot], list[bool]]:
-    """Return a function that returns the bits of a bank that are separate variables."""
-
-    def read(snapshot: Snapshot) -> list[bool]:
-        words: list[int] = getattr(snapshot.io, bank)
-        return [bool(words[number // 32] >> number % 32 & 1) for number in SINGLE_BITS]
-
-    return read
+def _single_bits(bank: str, snapshot: Snapshot) -> list[bool]:
+    """Return the bits of a bank that are separate variables."""
+    words: list[int] = getattr(snapshot.io, bank)
+    return [bool(words[number // 32] >> number % 32 & 1) for number in SINGLE_BITS]
 
 
 def _parts() -> Iterator[tuple[str, tuple[OutputSource, int]]]:
@@ -128,7 +125,8 @@ def _parts() -> Iterator[tuple[str, tuple[OutputSource, int]]]:
         )
         yield from ((name, (whole, row)) for row, name in enumerate(words))
         if bits:
-            single = OutputSource(_single_bits(bank), WireType.BOOL.value, len(SINGLE_BITS), of_io=True)
+            read = partial(_single_bits, bank)
+            single = OutputSource(read, WireType.BOOL.value, len(SINGLE_BITS), of_io=True)
             yield from ((f"{bank}_{number}", (single, row)) for row, number in enumerate(SINGLE_BITS))
 
 

@@ -10,12 +10,12 @@ from tvist_controller.instruments.report import Sink
 from tvist_protocol.codec import encode
 from tvist_server.ur_ports import UrPorts
 
-EVERYWHERE = dict.fromkeys(UrPorts().open(), 0)  # a port that is free, for each
-PATIENCE = 60.0  # after how long something is taken to hang [s]
+EVERYWHERE = dict.fromkeys(UrPorts().open(), 0)  # a free port for each interface
+PATIENCE = 60.0  # longest wait; what takes longer hangs [s]
 
 
 class ControllerThread(Sink):
-    """A controller, and what its thread does for clients: at once or, if `late`, when `answer` is called."""
+    """A controller that does the jobs of clients at once or, if `late`, when `answer` is called."""
 
     def __init__(self, *, late=False):
         self.controller = Robot().controller
@@ -33,7 +33,7 @@ class ControllerThread(Sink):
         while self._due:
             self._due.popleft()()
 
-    def command(self, command, answer, origin=None):  # noqa: ARG002  as the desk has it
+    def command(self, command, answer, origin=None):  # noqa: ARG002  as CommandIntake has it
         self.last = command
 
         def carry_out():
@@ -43,7 +43,7 @@ class ControllerThread(Sink):
         self.post(carry_out)
 
     def client_seen(self, name, session=""):
-        """Nobody asks."""
+        """Do nothing: no test asks."""
 
     def client_gone(self, name, session=""):
         self.post(lambda: self.host.client_gone(name, session))
@@ -53,8 +53,8 @@ class ControllerThread(Sink):
         return None if lease is None else lease.client
 
 
-class Desk(ControllerThread):
-    """A controller in the loop's own thread, and interfaces; `tick` lets time pass."""
+class ServedController(ControllerThread):
+    """A controller behind UR interfaces, in the thread of the event loop; `tick` lets time pass."""
 
     def __init__(self):
         super().__init__()
@@ -76,14 +76,14 @@ class Desk(ControllerThread):
             await asyncio.sleep(0)
 
 
-async def connect(desk, interface):
-    reader, writer = await asyncio.open_connection("127.0.0.1", desk.interfaces.ports[interface])
-    desk.writers.append(writer)
+async def connect(served, interface):
+    reader, writer = await asyncio.open_connection("127.0.0.1", served.interfaces.ports[interface])
+    served.writers.append(writer)
     return reader, writer
 
 
 async def until(condition):
-    """Give the loop its turns until something is so."""
+    """Let the loop run until a condition is met."""
     async with asyncio.timeout(PATIENCE):
         while not condition():  # noqa: ASYNC110  what changes belongs to the loop
             await asyncio.sleep(0)
@@ -97,8 +97,8 @@ async def lines(reader, writer, *sent):
     return answers
 
 
-async def connect_and_greet(desk):
-    """A client of the dashboard that was greeted."""
-    reader, writer = await connect(desk, "dashboard")
+async def connect_and_greet(served):
+    """Connect a client to the dashboard, and read the greeting."""
+    reader, writer = await connect(served, "dashboard")
     await reader.readline()
     return reader, writer
