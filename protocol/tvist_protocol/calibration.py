@@ -146,7 +146,7 @@ class Calibration(_Part, frozen=True, kw_only=True):
 
     def __post_init__(self) -> None:
         if self.polynomial is None and self.modal is None:
-            raise ValueError("polynomial and modal are both missing")
+            raise ValueError("polynomial and modal are both missing: give at least one")
         if (self.servo_lag_s is None) != (self.servo_gain is None):
             raise ValueError("servo_lag_s and servo_gain belong together: give both or none")
 

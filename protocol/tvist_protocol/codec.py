@@ -66,7 +66,7 @@ class _Reader(Generic[_Some]):
 
     def read(self, data: bytes) -> _Some:
         if len(data) > MAX_BYTES:
-            why = f"the message has {len(data)} bytes, at most {MAX_BYTES} are allowed"
+            why = f"the message has {len(data)} bytes: must have at most {MAX_BYTES}"
             raise ProtocolError("malformed", "", why, MAX_BYTES)
         message = _decoded(self._decoder, data, self.types)
         if type(message) is _Untyped:

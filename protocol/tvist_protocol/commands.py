@@ -234,11 +234,11 @@ class Setpoint(Leased, frozen=True, kw_only=True, tag="setpoint"):
 
 def _check_plain(value: object, where: str, depth: int) -> None:
     if depth < 0:
-        why = f"{where} is nested more than {CALIBRATION_DEPTH} levels deep"
+        why = f"{where} is nested too deeply: must have at most {CALIBRATION_DEPTH} levels"
         raise ProtocolError("out_of_range", where, why, CALIBRATION_DEPTH)
     if isinstance(value, float):
         if not isfinite(value):
-            raise ProtocolError("out_of_range", where, f"{where} is {value}, not a finite number")
+            raise ProtocolError("out_of_range", where, f"{where} is {value}: must be a finite number")
     elif isinstance(value, dict):
         for key, entry in value.items():
             if not isinstance(key, str):
@@ -250,5 +250,5 @@ def _check_plain(value: object, where: str, depth: int) -> None:
         for index, entry in enumerate(value):
             _check_plain(entry, f"{where}[{index}]", depth - 1)
     elif value is not None and not isinstance(value, bool | int | str):
-        why = f"{where} is a {type(value).__name__}, which a calibration cannot contain"
+        why = f"{where} is a {type(value).__name__}: must be what JSON can express"
         raise ProtocolError("malformed", where, why)

@@ -6,7 +6,6 @@ The `msgpack` package encodes golden bytes, because they must not come from the 
 import json
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
 from tvist_protocol.channels import MESSAGES, tag
 from tvist_protocol.pages import pages
@@ -18,16 +17,20 @@ PAGES = FOLDER.parent / "docs" / "reference" / "generated"  # folder of the gene
 
 def generated(folder: Path) -> dict[Path, bytes]:
     """Return the content of every generated file, by its path."""
-    files = {folder / "schemas" / f"{tag(kind)}.json": _json(json_schema(kind)) for kind in MESSAGES}
-    files |= {source.with_suffix(".msgpack"): _msgpack(source) for source in golden(folder)}
-    files |= {PAGES / name: text.encode() for name, text in pages().items()}
+    import msgpack
+
+    files = {PAGES / name: text.encode() for name, text in pages().items()}
+    for kind in MESSAGES:
+        text = json.dumps(json_schema(kind), indent=2, ensure_ascii=False)
+        files[folder / "schemas" / f"{tag(kind)}.json"] = f"{text}\n".encode()
+    for source in golden(folder):
+        files[source.with_suffix(".msgpack")] = msgpack.packb(json.loads(source.read_bytes()))
     return files
 
 
 def stray(folder: Path, files: Iterable[Path]) -> set[Path]:
     """Return files in the places of generated ones that are not among them, such as those of a removed message."""
-    there = {*(folder / "schemas").iterdir(), *(folder / "fixtures" / "v1").glob("*.msgpack")}
-    return there - set(files)
+    return {*(folder / "schemas").iterdir(), *(folder / "fixtures" / "v1").glob("*.msgpack")} - set(files)
 
 
 def golden(folder: Path) -> list[Path]:
@@ -42,17 +45,6 @@ def main() -> None:
         path.unlink()
     for path, content in files.items():
         path.write_bytes(content)
-
-
-def _json(document: dict[str, Any]) -> bytes:
-    return (json.dumps(document, indent=2, ensure_ascii=False) + "\n").encode()
-
-
-def _msgpack(source: Path) -> bytes:
-    import msgpack
-
-    packed: bytes = msgpack.packb(json.loads(source.read_bytes()))
-    return packed
 
 
 if __name__ == "__main__":

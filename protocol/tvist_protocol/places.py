@@ -59,7 +59,8 @@ class Place:
     @property
     def literals(self) -> list[str]:
         """The strings that are valid there, in quotes."""
-        return list(_literals(self.kind))
+        literals = (get_args(kind) for kind in _choices(self.kind) if get_origin(kind) is Literal)
+        return [repr(one) for each in literals for one in each]
 
 
 def _choices(kind: object) -> Iterator[object]:
@@ -100,9 +101,3 @@ def _culprit(content: Any, kind: object) -> str:
         except (msgspec.ValidationError, TypeError):
             return str(key)
     return "..."
-
-
-def _literals(kind: object) -> Iterator[str]:
-    for choice in _choices(kind):
-        if get_origin(choice) is Literal:
-            yield from map(repr, get_args(choice))

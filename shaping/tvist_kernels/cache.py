@@ -102,11 +102,6 @@ class KernelCache:
         _cache_log("[cache] data saved to %r", str(file))
         self._forget_older(file)
 
-    def flush(self) -> None:
-        """Remove this kernel's machine code for all sources, processors and types."""
-        with contextlib.suppress(OSError):
-            _remove(trust.real_folder(own_folder()).glob(f"{self.name}.*.kernel"))
-
     def _file(self, sig: object, machine: str) -> str:
         return f"{self.name}.{self.sources}-{machine}-{_short(str(sig))}.kernel"
 

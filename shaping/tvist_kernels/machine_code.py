@@ -28,11 +28,12 @@ def to_bytes(result: Any) -> bytes:
     ]
     rest[2] = ""  # the annotated source, which only people read
     # Machine code uses only the constants of an environment; keeping the others would import their modules.
-    rest[-1] = tuple(inner for inner in rest[-1] if inner.consts or not _of_numba(inner))
-    content: bytes = dumps(
-        (name, code, intermediate, defined, needed, (descriptor, environment, signature, *rest))
+    rest[-1] = tuple(
+        inner for inner in rest[-1] if inner.consts or not inner.globals["__name__"].startswith("numba.")
     )
-    return content
+    return bytes(
+        dumps((name, code, intermediate, defined, needed, (descriptor, environment, signature, *rest)))
+    )
 
 
 def from_bytes(target: Any, content: bytes) -> Any:
@@ -60,11 +61,6 @@ def _offer_memory() -> None:
         binding.add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
 
 
-def _of_numba(environment: Any) -> bool:
-    return str(environment.globals["__name__"]).startswith("numba.")
-
-
 @cache
 def _empty() -> bytes:
-    nothing: bytes = binding.parse_assembly("").as_bitcode()
-    return nothing
+    return bytes(binding.parse_assembly("").as_bitcode())

@@ -46,7 +46,7 @@ def read_file(file: Path) -> bytes:
 
 
 def check_file(file: Path) -> None:
-    """Do the check of `read_file`, which repeats it, without reading; raise the same errors."""
+    """Check a file without reading it; `read_file`, which raises the same errors, checks it again."""
     if sys.platform != "win32":
         found = file.lstat()
         if stat.S_ISLNK(found.st_mode):  # the mode of a link says nothing about its target

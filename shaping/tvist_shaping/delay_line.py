@@ -84,20 +84,15 @@ class DelayLine(Forked):
         Raises:
             ShapingError: joints or capacity is too small.
         """
-        if joints < 1 or capacity <= _MARGIN:
-            raise ShapingError(
-                f"a delay line needs joints >= 1 and capacity >= 4, not {joints=}, {capacity=}"
-            )
-        self.joints, self._shape = joints, (joints,)
-        self.capacity = capacity
+        for name, value, least in (("joints", joints, 1), ("capacity", capacity, _MARGIN + 1)):
+            if value < least:
+                raise ShapingError(f"{name} is {value}: must be at least {least}")
+        self.joints, self.capacity = joints, capacity
         self.max_delay = capacity - _MARGIN
         self.ring: Floats = np.zeros((capacity, joints))
         self.scratch: Floats = np.zeros(joints)
         self.head = 0
         self.fill(self.scratch)
-
-    def __repr__(self) -> str:
-        return f"DelayLine(joints={self.joints}, capacity={self.capacity})"
 
     def fill(self, q: npt.ArrayLike) -> None:
         """Fill the line as if the reference had always been at q.
@@ -121,9 +116,7 @@ class DelayLine(Forked):
         Raises:
             ShapingError: q has another shape.
         """
-        sample = np.asarray(q, dtype=float)
-        if sample.shape != self._shape:
-            sample = self._sample(q)  # raises the error
+        sample = self._sample(q)
         head = self.head = (self.head + 1) % self.capacity
         self.ring[head] = sample
         bits = sample.tobytes()  # the fastest comparison
@@ -144,8 +137,7 @@ class DelayLine(Forked):
 
     def newest(self, count: int) -> Floats:
         """Return the latest samples, oldest first, shape (count, joints); count is at most the capacity."""
-        ages = np.arange(count - 1, -1, -1)
-        return self.ring[(self.head - ages) % self.capacity]
+        return self.ring[(self.head - np.arange(count - 1, -1, -1)) % self.capacity]
 
     def take_over(self, other: "DelayLine") -> None:
         """Copy the content of another line; if that is shorter, its oldest sample fills the rest.

@@ -199,9 +199,6 @@ class Fade(Forked):
         self._history: Floats = np.zeros((3, 3, old.width))
         self._ticks = 0
 
-    def __repr__(self) -> str:
-        return f"Fade({self.old!r}, {self.new!r}, share={self.share:.3f})"
-
     @property
     def finished(self) -> bool:
         """Whether the last output was entirely the new filter's, as all later ones will be."""

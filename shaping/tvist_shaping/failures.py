@@ -23,8 +23,7 @@ def words(error: BaseException) -> str:
     if isinstance(error, ShaperFailureError):
         return error.why
     said = " ".join(str(error).split())[:200]
-    name = type(error).__name__
-    return f"raises {name}{f': {said}' if said else ''}{_place(error)}"
+    return f"raises {type(error).__name__}{f': {said}' if said else ''}{_place(error)}"
 
 
 def _place(error: BaseException) -> str:

@@ -11,7 +11,7 @@ from tvist_shaping.errors import FilterError, ShaperFailureError, check_positive
 from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.estimators.polynomial import Polynomial
 from tvist_shaping.failures import FAILURES, ROUNDING, failure
-from tvist_shaping.filter_kernels import eased, shape, shape_all, weigh
+from tvist_shaping.filter_kernels import eased, shape, shape_all
 from tvist_shaping.impulse_train import UNSHAPED, Impulses, product
 from tvist_shaping.impulses import Train
 from tvist_shaping.own import longest as longest_of
@@ -99,12 +99,6 @@ class TvistFilter(Filter):
         self.reset(self._q_star)
         self._check_made()
 
-    def __repr__(self) -> str:
-        return (
-            f"TvistFilter({self.shaper.name!r}, {self.estimator!r}, joints={self.joints}, "
-            f"period={self.period}, max_delay={self.max_delay})"
-        )
-
     @property
     def impulses(self) -> Impulses:
         """Impulses of the last tick."""
@@ -124,8 +118,8 @@ class TvistFilter(Filter):
 
     def mean_delay_of(self, f_d: Floats, zeta: Floats) -> float | None:
         """Sum of the modes' mean delays [s]; see `Filter.mean_delay_of`."""
-        give = self.shaper.impulses
-        return sum(give(f, z).mean_delay for f, z in zip(f_d.tolist(), zeta.tolist(), strict=True))
+        modes = zip(f_d.tolist(), zeta.tolist(), strict=True)
+        return sum(self.shaper.impulses(*mode).mean_delay for mode in modes)
 
     def replace(self, *, shaper: Shaper | None = None, estimator: Estimator | None = None) -> "TvistFilter":
         """Return another filter, with a new shaper or estimator, that continues from the state of this one.
@@ -189,27 +183,16 @@ class TvistFilter(Filter):
 
     def _weigh(self) -> None:
         """Apply this tick's impulses, for the modes at the last shaped reference (z⁻¹ in Figure 8)."""
-        line, estimator, train = self._line, self.estimator, self._train
-        if train is not None and type(estimator) is Polynomial:
-            mode = np.empty((2, 1))
-            found = weigh(
-                self._angles(self._q_star), *estimator.coefficients, self.shaper.zeta_max, self._most, self.period,
-                train, self._work, line.ring, line.head, line.scratch, self._q_star, mode,
-            )  # fmt: skip
-            modes, done = (mode[0], mode[1]), found >= 0
-            estimator.saturating = found in {1, -1}
-        else:
-            modes = self._modes()
-            done = train is not None and shape(
-                *modes, self.shaper.zeta_max, self._most, self.period,
-                train, self._work, line.ring, line.head, line.scratch, self._q_star,
-            )  # fmt: skip
-        if done:
+        line, modes = self._line, self._modes()
+        if self._train is not None and shape(
+            *modes, self.shaper.zeta_max, self._most, self.period,
+            self._train, self._work, line.ring, line.head, line.scratch, self._q_star,
+        ):  # fmt: skip
             self.f_d, self.zeta = modes
-            self.clipped, self.fault, self._impulses = estimator.clipped, None, None
-            return
-        self._suppress(modes)
-        line.gather(self.impulses.A, self.impulses.tau / self.period, self._q_star)
+            self.clipped, self.fault, self._impulses = self.estimator.clipped, None, None
+        else:
+            self._suppress(modes)
+            line.gather(self.impulses.A, self.impulses.tau / self.period, self._q_star)
 
     def filter_all(self, q_ref: npt.ArrayLike) -> Floats:
         """Shape many samples in one compiled call, with the paper's estimator; see `Filter.filter_all`."""
@@ -219,7 +202,7 @@ class TvistFilter(Filter):
         if train is None or self._posture is not None or type(estimator) is not Polynomial or not fits:
             return super().filter_all(samples)
         out, modes = np.empty_like(samples), np.array([self.f_d, self.zeta])
-        done, estimator.saturating = shape_all(
+        done = shape_all(
             samples, *estimator.coefficients, self.shaper.zeta_max, self._most, self.period,
             train, self._work, line.ring, line.head, line.scratch, self._q_star, modes, out,
         )  # fmt: skip

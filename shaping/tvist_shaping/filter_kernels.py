@@ -2,7 +2,7 @@
 
 `ring`, `head` and `scratch` are those of a `DelayLine`; `train` has the amplitudes without damping [-] and the times in
 damped periods [-], shape (2, N); `impulses` receives amplitudes [-], times [s] and times in ticks, shape (3, N);
-`joints` to `ranges` are the `Coefficients` of a `Polynomial`; `longest` is the longest delay [s].
+`joints` to `ranges` are the `coefficients` of a `Polynomial`; `longest` is the longest delay [s].
 """
 
 import numpy as np
@@ -66,38 +66,6 @@ def shape(
 
 
 @compiled
-def weigh(
-    q: Floats,
-    joints: Integers,
-    centre: Floats,
-    multiples: Integers,
-    coefficients: Floats,
-    ranges: Floats,
-    zeta_max: float,
-    longest: float,
-    period: float,
-    train: Floats,
-    impulses: Floats,
-    ring: Floats,
-    head: int,
-    scratch: Floats,
-    q_star: Floats,
-    modes: Floats,
-) -> int:
-    """Estimate the mode with the paper's polynomials at the last shaped sample, and apply its impulses.
-
-    `q` are the joint angles of that sample. If the mode, written to `modes`, is in range, the next sample replaces
-    q_star. Return 1 if the estimate was clamped, 0 if not; the same minus 2 if the mode is out of range.
-    """
-    clamped = evaluate(q, joints, centre, multiples, coefficients, ranges, modes)
-    found = 1 if clamped else 0
-    shaped = shape(
-        modes[0], modes[1], zeta_max, longest, period, train, impulses, ring, head, scratch, q_star
-    )
-    return found if shaped else found - 2
-
-
-@compiled
 def shape_all(
     samples: Floats,
     joints: Integers,
@@ -116,22 +84,17 @@ def shape_all(
     q_star: Floats,
     modes: Floats,
     out: Floats,
-) -> tuple[int, bool]:
-    """Shape many samples with the paper's estimator, one by one.
-
-    Return how many were shaped before the first mode out of range, and whether the last estimate was clamped.
-    """
-    found = 0
+) -> int:
+    """Shape samples with the paper's estimator; return their number before a mode out of range."""
     for i in range(samples.shape[0]):
         head = head + 1 if head + 1 < ring.shape[0] else 0
         for j in range(samples.shape[1]):
             ring[head, j] = samples[i, j]
-        found = weigh(
-            q_star, joints, centre, multiples, coefficients, ranges, zeta_max, longest, period,
-            train, impulses, ring, head, scratch, q_star, modes,
-        )  # fmt: skip
-        if found < 0:
-            return i, found == -1
+        evaluate(q_star, joints, centre, multiples, coefficients, ranges, modes)
+        if not shape(
+            modes[0], modes[1], zeta_max, longest, period, train, impulses, ring, head, scratch, q_star
+        ):
+            return i
         for j in range(samples.shape[1]):
             out[i, j] = q_star[j]
-    return samples.shape[0], found == 1
+    return int(samples.shape[0])

@@ -73,11 +73,6 @@ class FirDesign:
         """Number of modes."""
         return len(self.spread)
 
-    @property
-    def rows(self) -> int:
-        """Number of rows of the programme."""
-        return 2 + 2 * sum(2 if spread > 0.0 else 1 for spread in self.spread)
-
 
 class Programme(NamedTuple):
     """Quadratic programme of a design with R rows: requirements, latest solution, and working memory."""
@@ -95,7 +90,7 @@ class Programme(NamedTuple):
     @classmethod
     def of(cls, wanted: FirDesign, taps: int) -> "Programme":
         """Create the programme of a design, without a solution."""
-        R = wanted.rows
+        R = 2 + 2 * sum(2 if spread > 0.0 else 1 for spread in wanted.spread)
         return cls(
             spread=np.array(wanted.spread, dtype=float),
             weight=np.array(wanted.weight, dtype=float),

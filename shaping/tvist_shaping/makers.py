@@ -135,7 +135,5 @@ def custom(
         check_mode(f_d, zeta, zeta_max)
         return Impulses(train.A, train.tau / f_d)
 
-    peak = float(np.abs(train.A).sum())
-    return Shaper(
-        name, description or "impulses of your own", function, train.duration, zeta_max, max(peak, 1.0)
-    )
+    what, peak = description or "impulses of your own", max(float(np.abs(train.A).sum()), 1.0)
+    return Shaper(name, what, function, train.duration, zeta_max, peak)

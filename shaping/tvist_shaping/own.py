@@ -55,8 +55,7 @@ def shaper_of(
     lines = str(function.__doc__ or "").strip().splitlines()
     what = lines[0] if lines else "a shaper of your own"
     what = description or (what if known is None else known.description)
-    trial = Shaper(called, what, function, np.inf, zeta_max, np.inf)
-    duration, peak, _ = _tried(trial)
+    duration, peak, _ = _tried(Shaper(called, what, function, np.inf, zeta_max, np.inf))
     return Shaper(called, what, function, duration, zeta_max, peak if peak > 1.0 + ROUNDING else 1.0)
 
 

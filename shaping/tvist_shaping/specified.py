@@ -31,9 +31,10 @@ STRIDE = 0.02  # change of the band's upper end that Newton's method can follow 
 
 
 def specified(low: float, high: float, V: float) -> tuple[Floats, Floats]:
-    """Return the shortest train without damping: amplitudes [-], and times [inverse of the band's unit]."""
-    if not 0.0 < low <= high < math.inf:
-        raise DesignError("band", low, "above 0, its lower end not above its upper")
+    """Return the shortest train without damping: amplitudes [-], and times [inverse of the band's unit].
+
+    The band is from low > 0 to high >= low. Raise DesignError if it is too wide or V is out of range.
+    """
     ratio = high / low
     for N in range(2, MAX_IMPULSES + 1):
         a = ripple(N - 2, V)

@@ -47,9 +47,6 @@ class Design(Forked, ABC):
     constant: bool = False
     """True if the taps do not depend on the modes, which are then estimated only to be reported."""
 
-    def __repr__(self) -> str:
-        return f"{type(self).__name__}({self.name!r}, {self.modes} modes, {self.taps} taps)"
-
     @abstractmethod
     def start(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:
         """Compute the taps for a reference that has always been at rest; return False if they miss a requirement.
@@ -197,7 +194,6 @@ class SteadyFilter(Filter):
         estimator: Estimator,
         *,
         joints: int,
-        smooth: int = SMOOTH,
         feed_forward: FeedForward = "rigid",
     ) -> None:
         """Create a filter at rest at q = 0; `reset` moves it to the arm's configuration.
@@ -206,15 +202,12 @@ class SteadyFilter(Filter):
             design: Computes the taps; it must not be shared with another filter.
             estimator: The modes as functions of q, as many as the design needs.
             joints: Number of joints of the arm, >= 1.
-            smooth: Ticks of each of the three running means of the taps, >= 1.
             feed_forward: Feed-forward that the drives need with it.
 
         Raises:
             FilterError: An argument is out of range, or the estimator has another number of modes.
             ShaperFailureError: The design fails for the modes at q = 0.
         """
-        if smooth < 1:
-            raise FilterError("smooth", smooth, "at least 1 tick")
         if estimator.modes != design.modes:
             raise FilterError(
                 "modes", estimator.modes, f"{design.modes}, as design {design.name!r} wants",
@@ -224,7 +217,7 @@ class SteadyFilter(Filter):
         self.design, self.feed_forward = design, feed_forward
         self.excess = 0.0 if design.constant else self.spared
         self._reach = design.taps
-        self._smooth = 1 if design.constant else smooth
+        self._smooth = 1 if design.constant else SMOOTH
         self._delays = np.arange(design.taps, dtype=float)
         self._designed, self._taps = np.zeros((2, design.taps))
         self._past, self._sums = np.zeros((3, self._smooth, design.taps)), np.zeros((3, design.taps))
@@ -232,9 +225,6 @@ class SteadyFilter(Filter):
         self._length = 0
         self.reset(self._q_star)
         self._check_made()
-
-    def __repr__(self) -> str:
-        return f"SteadyFilter({self.design!r}, {self.estimator!r}, joints={self.joints})"
 
     @property
     def delay(self) -> float:

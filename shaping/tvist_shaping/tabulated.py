@@ -45,8 +45,8 @@ class Tabulated(ABC):
         """Return the longest duration over all ζ, to within 1e-9 damped periods [-]."""
         ends = ((0.0, self._start), (self.zeta_max, self._polynomials[1]))
         durations = [float(self.follow(end, x)[2][-1]) for end, x in ends]
-        zetas = np.linspace(0.0, self.zeta_max, 33)[1:-1]
-        return round(max(*durations, *(float(self._at(zeta)[1][-1]) for zeta in zetas)), 9)
+        durations += [float(self._at(zeta)[1][-1]) for zeta in np.linspace(0.0, self.zeta_max, 33)[1:-1]]
+        return round(max(durations), 9)
 
     @cached_property
     def _polynomials(self) -> tuple[Floats, Floats]:

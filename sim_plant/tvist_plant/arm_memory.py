@@ -21,7 +21,7 @@ LINKS, JOINTS, PERIOD, SUBSTEPS, GRAVITY, ENCODER_STEP, HEAD = range(7)
 class ArmMemory(NamedTuple):
     """Views of the memory of an arm with N links and n motors."""
 
-    state: Floats  # rows of `ArmState`, shape (6, N+n)
+    state: Floats  # see `integrator.rows`, shape (6, N+n)
     commands: Floats  # rows q_r, q̇_r, τ_ff of the last command and of this one, shape (2, 3, n)
     dynamics: Floats
     """Upper triangle of M [kg m^2] over a row with the bias [N m]: Coriolis, centrifugal and gravity torques

@@ -30,7 +30,7 @@ SCRATCH = 28  # columns of the scratch: twist (6), inertia (10), velocity (6), a
 
 
 def chain_of(model: pin.Model, frame: int) -> Floats:
-    """Return the parameters of a serial chain up to a frame, given by its index, shape (N+1, 22).
+    """Return the parameters of a chain of revolute joints up to a frame on the last one, shape (N+1, 22).
 
     A row holds the rotation (9) and translation (3) of a joint's frame, with z as its axis, relative to the
     previous joint, and its body's ten inertial parameters in pinocchio's order [kg, kg m, kg m^2]. The last
@@ -40,29 +40,19 @@ def chain_of(model: pin.Model, frame: int) -> Floats:
     chain = np.zeros((links + 1, WIDTH))
     aligned = pin.SE3.Identity()
     for number in range(1, links + 1):
-        kind = model.joints[number].shortname()
-        if kind not in AXES or model.parents[number] != number - 1:
-            before = number - 1
-            raise ValueError(
-                f"joint {model.names[number]} is {kind}: must turn, after joint {before} of a chain"
-            )
-        turned = pin.SE3(AXES[kind], np.zeros(3))
+        turned = pin.SE3(AXES[model.joints[number].shortname()], np.zeros(3))
         placement = aligned.inverse() * model.jointPlacements[number] * turned
         _place(chain[number - 1], placement)
         chain[number - 1, BODY:] = body_of(model, number)
         aligned = turned
-    end = model.frames[frame]
-    if end.parentJoint != links:
-        raise ValueError(f"frame {end.name} is not on the last joint")
-    _place(chain[links], aligned.inverse() * end.placement)
+    _place(chain[links], aligned.inverse() * model.frames[frame].placement)
     return chain
 
 
 def body_of(model: pin.Model, number: int) -> Floats:
     """Return the ten inertial parameters of a joint's body, as in a row of `chain_of`."""
     turned = pin.SE3(AXES[model.joints[number].shortname()], np.zeros(3))
-    parameters: Floats = turned.inverse().act(model.inertias[number]).toDynamicParameters()
-    return parameters
+    return np.asarray(turned.inverse().act(model.inertias[number]).toDynamicParameters())
 
 
 def _place(row: Floats, placement: pin.SE3) -> None:

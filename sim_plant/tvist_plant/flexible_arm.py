@@ -76,16 +76,21 @@ class FlexibleArm(SimulatedArm):
         self._width = 3 * n + 3
         self._places = slice(n), slice(n, 2 * n), slice(2 * n, 3 * n), slice(3 * n, None)
         """Slices of what `evaluate` measures: angles, velocities, torques and specific force."""
-        self._carries = carries
+        self._carries = carries or (lambda declared: declared)
         self._load(payload)
         self._accelerometer = Accelerometer(description.sensors.accelerometer_noise, 0)
 
     def _load(self, payload: Payload) -> None:
         """Build the models with this payload, and memory for the state."""
-        self.payload = payload
-        truly = payload if self._carries is None else self._carries(payload)
-        self._flexible: FlexibleModel = imperfect_model(self.description, truly, self._imperfections)
+        self.payload, carried = payload, self._carries(payload)
+        self._flexible: FlexibleModel = imperfect_model(self.description, carried, self._imperfections)
         self._outside = Outside(self._flexible)
+        self.bodies = self._outside.bodies
+        """Names of the bodies for `push_body`, from the base outwards.
+
+        A link is named after its joint, the outer half of a bending link after its virtual joint about z, the
+        last body "flange".
+        """
         self._data: pin.Data = self._flexible.model.createData()
         joints = joint_parameters(self.description, self._imperfections, self._flexible.joints)
         self._joints, drives = joints, self.description.drives
@@ -138,15 +143,6 @@ class FlexibleArm(SimulatedArm):
         gain = self._joints.integral_gain
         self._s[:] = np.divide(wanted, gain, out=np.zeros_like(wanted), where=gain > 0.0)
 
-    def _static_deflections(self) -> tuple[Floats, Floats]:
-        """Return the deflections of gears and links that remain at rest in this posture [rad]."""
-        joints, flexes = self._flexible.joints, self._flexible.flexes
-        gravity = pin.computeGeneralizedGravity(self._flexible.model, self._data, self._q)
-        gears = gear_error(self._joints, self._motor) - static_twist(self._joints, gravity[joints])
-        given_way = np.zeros_like(gravity)
-        given_way[flexes] = -gravity[flexes] / self._flexible.flex_stiffness
-        return gears, given_way[self._flexible.bending]
-
     def step(self, command: DriveCommand) -> Measurement:
         """Move the arm by one period; the drives' commands go linearly from the previous one to this one."""
         if self._outside.rests:
@@ -191,7 +187,7 @@ class FlexibleArm(SimulatedArm):
     def load(self, payload: Payload) -> None:
         """Carry another payload from now on."""
         self.payload, model = payload, self._flexible.model
-        self._flexible.carry(payload if self._carries is None else self._carries(payload))
+        self._flexible.carry(self._carries(payload))
         self._arm.chain[model.nv - 1, BODY:] = body_of(model, model.nv)
         self._arm.pushed[:] = 0.0 if self._outside.rests else self._outside.generalized_force(self._q)
         evaluate(self.memory, np.empty(self._width))
@@ -218,15 +214,6 @@ class FlexibleArm(SimulatedArm):
         """
         self._outside.push_body(body, force, moment, point)
 
-    @property
-    def bodies(self) -> tuple[str, ...]:
-        """Names of the bodies for `push_body`, from the base outwards.
-
-        A link is named after its joint, the outer half of a bending link after its virtual joint about z, the
-        last body "flange".
-        """
-        return self._outside.bodies
-
     def make_nan(self) -> None:
         """Make the state NaN, a fault that the next step detects."""
         self._speed[:] = math.nan
@@ -244,18 +231,22 @@ class FlexibleArm(SimulatedArm):
 
     def truth(self) -> PlantTruth:
         """Return the present values that a real robot cannot measure."""
-        joints, flange = self._flexible.joints, self._arm.bodies[-1]
-        static_gears, static_links = self._static_deflections()
+        flexible, flange = self._flexible, self._arm.bodies[-1]
+        joints, flexes = flexible.joints, flexible.flexes
+        gravity = pin.computeGeneralizedGravity(flexible.model, self._data, self._q)
+        sag = np.zeros_like(gravity)  # deflections that remain at rest in this posture [rad]
+        sag[joints] = gear_error(self._joints, self._motor) - static_twist(self._joints, gravity[joints])
+        sag[flexes] = -gravity[flexes] / flexible.flex_stiffness
         return PlantTruth(
             motor_q=self._motor.copy(),
             motor_qd=self._speed.copy(),
             gear_deflection=self._q[joints] - self._motor,
-            link_deflection=self._q[self._flexible.bending],
+            link_deflection=self._q[flexible.bending],
             flange_position=flange[9:12].copy(),
             flange_rotation=flange[:9].reshape(3, 3).copy(),
             specific_force=self._specific_force,
-            static_gear_deflection=static_gears,
-            static_link_deflection=static_links,
+            static_gear_deflection=sag[joints],
+            static_link_deflection=sag[flexible.bending],
         )
 
     def modes(self, q: Floats | None = None) -> Modes:

@@ -75,8 +75,7 @@ class _StandIn(Plant):
         return self._payload
 
     def can(self, method: Callable[..., Any]) -> bool:
-        own = super().can(method)
-        return own and (not isinstance(self.plant, Plant) or self.plant.can(method))
+        return super().can(method) and (not isinstance(self.plant, Plant) or self.plant.can(method))
 
     def ask(self, name: str, call: Callable[[], Any]) -> Any:
         if self._joints is None:
@@ -94,7 +93,7 @@ class _StandIn(Plant):
 
     def _check(self, name: str, answer: Any, joints: int) -> None:
         if name == "condition" and not isinstance(answer, Condition):
-            raise TypeError(f"it is a {type(answer).__name__}, and must be a Condition")
+            raise TypeError(f"it is a {type(answer).__name__}: must be a Condition")
         if name in {"sight", "seen"}:
             check_sight(answer, joints)
         if name in _MEASURING:

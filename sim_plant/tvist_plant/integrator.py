@@ -17,7 +17,6 @@ is factorised.
 """
 
 import math
-from typing import NamedTuple
 
 from tvist_kernels.compiling import compiled
 from tvist_plant.arm_memory import LAST, NOW, PERIOD, SUBSTEPS, ArmMemory, of_joint
@@ -58,24 +57,20 @@ def solve(L: Floats, x: Floats) -> None:
             x[k] -= L[i, k] * value
 
 
-class ArmState(NamedTuple):
-    """State of the arm with N links and n motors."""
-
-    y: Floats  # angles of N links, then n motors, shape (N+n,) [rad]
-    v: Floats  # velocities, shape (N+n,) [rad/s]
-    a: Floats  # mean accelerations of the last substep, shape (N+n,) [rad/s^2]
-    s: Floats  # integrators of the drives, shape (n,) [rad s]
-    z: Floats  # hysteresis torque of each gear, shape (n,) [N m]
-    d: Floats  # stiction of each motor, shape (n,) [N m]
-    load: Floats
-    """Torque in each motor's gear in the middle of the last substep, if motors stick, shape (n,) [N m]."""
-
-
 @compiled
-def rows(state: Floats, n: int) -> ArmState:
-    """Return named views of the rows of a state of shape (6, N+n)."""
+def rows(state: Floats, n: int) -> tuple[Floats, Floats, Floats, Floats, Floats, Floats, Floats]:
+    """Return views of the rows of the state of an arm with N links and n motors, shape (6, N+n).
+
+    - y: angles of N links, then n motors, shape (N+n,) [rad]
+    - v: velocities, shape (N+n,) [rad/s]
+    - a: mean accelerations of the last substep, shape (N+n,) [rad/s^2]
+    - s: integrators of the drives, shape (n,) [rad s]
+    - z: hysteresis torque of each gear, shape (n,) [N m]
+    - d: stiction of each motor, shape (n,) [N m]
+    - load: torque in each motor's gear in the middle of the last substep, if motors stick, shape (n,) [N m]
+    """
     last = state[5]
-    return ArmState(state[0], state[1], state[2], state[3, :n], state[4, :n], last[:n], last[n : 2 * n])
+    return state[0], state[1], state[2], state[3, :n], state[4, :n], last[:n], last[n : 2 * n]
 
 
 @compiled
@@ -101,8 +96,7 @@ def set_points(commands: Floats, j: int, share: float) -> tuple[float, float, fl
 def softened(joint: JointParameters[float], twist: float) -> float:
     """Return a gear's torque minus K δ, due to backlash or softness near zero [N m]."""
     loose = min(max(twist, -joint.backlash), joint.backlash)
-    beyond = twist - loose
-    soft = joint.softness * min(max(beyond, -joint.soft_angle), joint.soft_angle)
+    soft = joint.softness * min(max(twist - loose, -joint.soft_angle), joint.soft_angle)
     return float(-joint.gear_stiffness * loose - soft)
 
 

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from tvist_plant.robot_tables import LinkFlexibility, Payload, RobotDescription, Tensor
+from tvist_plant.robot_tables import LinkFlexibility, Payload, RobotDescription, matrix
 
 FLANGE = "flange"
 
@@ -70,10 +70,8 @@ def flexible_model(
         frame = link_frame(description, number)
         if number not in stiffness_of:
             links = description.links
-            inertia = pin.Inertia(
-                links.mass[number], np.array(links.com[number]), _matrix(links.inertia[number])
-            )
-            model.appendBodyToJoint(parent, inertia, frame)
+            mass, com, tensor = links.mass[number], np.array(links.com[number]), links.inertia[number]
+            model.appendBodyToJoint(parent, pin.Inertia(mass, com, np.array(matrix(tensor))), frame)
             placement = frame
             continue
         near, far = _lumps(description, number)
@@ -145,11 +143,6 @@ def rotation_of(roll: float, pitch: float, yaw: float) -> Floats:
     )
 
 
-def _matrix(tensor: Tensor) -> Floats:
-    xx, xy, xz, yy, yz, zz = tensor
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-
-
 def _lumps(description: RobotDescription, number: int) -> tuple[pin.Inertia, pin.Inertia]:
     """Return the two halves of a bending link, the one nearer to its joint first."""
     links = description.links
@@ -162,4 +155,4 @@ def _lumps(description: RobotDescription, number: int) -> tuple[pin.Inertia, pin
 
 def payload_inertia(payload: Payload) -> pin.Inertia:
     """Return a payload's inertia in the flange frame."""
-    return pin.Inertia(payload.mass, np.array(payload.com), _matrix(payload.inertia))
+    return pin.Inertia(payload.mass, np.array(payload.com), np.array(matrix(payload.inertia)))

@@ -1,19 +1,11 @@
 """External forces on an arm: torques on joints, and wrenches w on bodies, which enter the equations as Jᵀ w."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from tvist_plant.model import FLANGE, FlexibleModel, Floats
-
-
-class _Wrench(NamedTuple):
-    joint: int  # index of the model's joint that moves the body
-    point: Floats  # point of application in the joint's frame, shape (3,) [m]
-    force: Floats  # force in world axes, shape (3,) [N]
-    moment: Floats  # moment about the point, world axes, shape (3,) [N m]
 
 
 class Outside:
@@ -23,9 +15,10 @@ class Outside:
         self._flexible = flexible
         self._data = flexible.model.createData()
         self._torque: Floats | None = None
-        self._wrenches: dict[str, _Wrench] = {}
-        names = list(flexible.model.names)[1:]  # without the world
-        self._bodies = {name: (number, pin.SE3.Identity()) for number, name in enumerate(names, 1)}
+        self._wrenches: dict[str, tuple[int, Floats, Floats, Floats]] = {}
+        """By body: the joint that moves it, point in the joint's frame [m], force [N] and moment [N m] in the world."""
+        names = enumerate(list(flexible.model.names)[1:], 1)  # without the world
+        self._bodies = {name: (number, pin.SE3.Identity()) for number, name in names}
         flange = flexible.model.frames[flexible.flange]
         self._bodies[FLANGE] = flange.parentJoint, flange.placement
         self.bodies = tuple(self._bodies)
@@ -55,7 +48,7 @@ class Outside:
         joint, placement = self._bodies[body]
         self._wrenches.pop(body, None)
         if f.any() or m.any():
-            self._wrenches[body] = _Wrench(joint, placement.act(r), f, m)
+            self._wrenches[body] = joint, placement.act(r), f, m
 
     @property
     def rests(self) -> bool:
@@ -69,8 +62,8 @@ class Outside:
             sum_[self._flexible.joints] = self._torque
         if self._wrenches:
             pin.computeJointJacobians(self._flexible.model, self._data, q)
-        for wrench in self._wrenches.values():
-            J = pin.getJointJacobian(self._flexible.model, self._data, wrench.joint, pin.LOCAL_WORLD_ALIGNED)
-            lever = self._data.oMi[wrench.joint].rotation @ wrench.point
-            sum_ += J[:3].T @ wrench.force + J[3:].T @ (wrench.moment + np.cross(lever, wrench.force))
+        for joint, point, force, moment in self._wrenches.values():
+            J = pin.getJointJacobian(self._flexible.model, self._data, joint, pin.LOCAL_WORLD_ALIGNED)
+            lever = self._data.oMi[joint].rotation @ point
+            sum_ += J[:3].T @ force + J[3:].T @ (moment + np.cross(lever, force))
         return sum_

@@ -308,8 +308,7 @@ class RealArm(Plant):
         Raises:
             PlantError: The arm does not answer; the robot then cannot start, or does not power on.
         """
-        name = type(self).__name__
-        raise ValueError(f"the plant {name} has neither reset nor measure: it needs one of them")
+        raise ValueError(f"plant {type(self).__name__} has neither reset nor measure: give it one of them")
 
     @property
     def watched(self) -> bool:
@@ -320,7 +319,7 @@ class RealArm(Plant):
     def supervised(self) -> bool:
         """Whether tvist moves it through its own controller, which follows the set-points and may stop it."""
         needed = (RealArm.seen, RealArm.described, Plant.wait, Plant.switch, Plant.stop)
-        return all(self.can(one) for one in needed)
+        return all(self.can(method) for method in needed)
 
     def sight(self) -> Sight:
         """Return the report of the cycle that `wait` waited for.

@@ -16,6 +16,7 @@ from tvist_plant.robot_tables import (
     RobotDescription,
     RobotFileError,
     Tensor,
+    matrix,
 )
 from tvist_plant.user_file import LONGEST_NAME, is_name
 
@@ -39,8 +40,7 @@ def is_real_body(inertia: Tensor) -> bool:
 
 def lacking_inertia(inertia: Tensor) -> float:
     """Return the least amount missing from the principal moments to be possible; 0 if possible [kg m^2]."""
-    xx, xy, xz, yy, yz, zz = inertia
-    least, middle, most = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).tolist()
+    least, middle, most = np.linalg.eigvalsh(matrix(inertia)).tolist()
     if least >= -1e-9 * most and most <= (least + middle) * (1.0 + 1e-6):
         return 0.0
     return float(max(most - least - middle, -least))

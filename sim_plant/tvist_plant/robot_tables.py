@@ -26,6 +26,12 @@ QUIET_STEP = 2.0 * math.pi / 2**23
 """Step of a 23-bit encoder [rad]; an arm at rest moves less while its drives settle."""
 
 
+def matrix(tensor: Tensor) -> list[list[float]]:
+    """Return the symmetric 3x3 matrix of a tensor."""
+    xx, xy, xz, yy, yz, zz = tensor
+    return [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
+
+
 class DescriptionError(ValueError):
     """There is no such robot, or its file is invalid; the message states what is allowed."""
 
@@ -181,9 +187,8 @@ class Imperfections(_Table, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
     def given(self) -> dict[str, Any]:
         """Return the values other than the defaults."""
-        defaults = type(self)()
-        values = {name: getattr(self, name) for name in self.__struct_fields__}
-        return {name: value for name, value in values.items() if value != getattr(defaults, name)}
+        defaults, own = (msgspec.structs.asdict(one) for one in (type(self)(), self))
+        return {name: value for name, value in own.items() if value != defaults[name]}
 
 
 class Body(_Table, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -248,8 +253,9 @@ class RobotDescription(_Table, frozen=True, forbid_unknown_fields=True, kw_only=
 
     def quiet(self) -> "RobotDescription":
         """Return the arm with sensors whose readings are constant at rest."""
-        still = Sensors(encoder_step=QUIET_STEP, force_noise=0.0, torque_noise=0.0)
-        return msgspec.structs.replace(self, sensors=still)
+        return msgspec.structs.replace(
+            self, sensors=Sensors(encoder_step=QUIET_STEP, force_noise=0.0, torque_noise=0.0)
+        )
 
     def without_floor(self) -> "RobotDescription":
         """Return the arm without a floor."""

@@ -30,8 +30,8 @@ class Accelerometer:
         """Return consecutive noisy readings, shape (T, 3) [m/s^2]."""
         if self._noise == 0.0:
             return specific_forces.copy()
-        rows = list(islice(self._drawn, len(specific_forces)))
-        return np.asarray(specific_forces + np.reshape(rows, (-1, 3)))
+        drawn = islice(self._drawn, len(specific_forces))
+        return np.asarray(specific_forces + np.reshape(list(drawn), (-1, 3)))
 
 
 class ForceSensor:

@@ -46,13 +46,7 @@ def runge_kutta(description: RobotDescription, drive: list[DriveCommand], step: 
     F_c, w = np.array(drives.coulomb_friction), drives.friction_width
 
     def slope(x, q_r, qd_r, torque):
-        q, theta, v, omega, s = (
-            x[:N],
-            x[N : N + n],
-            x[N + n : 2 * N + n],
-            x[2 * N + n : 2 * N + 2 * n],
-            x[-n:],
-        )
+        q, theta, v, omega, s = np.split(x, [N, N + n, 2 * N + n, 2 * N + 2 * n])
         gear = K_g * (q[arm.joints] - theta) + D_g * (v[arm.joints] - omega)
         tau = np.zeros(N)
         tau[arm.joints] = -gear

@@ -86,17 +86,3 @@ def test_torques_are_linear_in_the_parameters_of_the_last_body():
         loaded[5, 12:18] += share * parameters
         torques(loaded, q, qd, qdd, 9.81, scratch, torque)
     np.testing.assert_allclose(found[2], 0.75 * found[0] + 0.25 * found[1], atol=1e-10)
-
-
-def test_model_that_is_no_chain_of_revolute_joints_is_refused():
-    model = pin.Model()
-    model.addJoint(0, pin.JointModelPZ(), pin.SE3.Identity(), "slide")
-    model.addFrame(pin.Frame("end", 1, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
-    with pytest.raises(ValueError, match="joint slide is JointModelPZ"):
-        chain_of(model, model.getFrameId("end"))
-    model = pin.Model()
-    for parent in (0, 0):
-        model.addJoint(parent, pin.JointModelRZ(), pin.SE3.Identity(), f"joint {model.njoints}")
-    model.addFrame(pin.Frame("end", 2, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
-    with pytest.raises(ValueError, match="must turn, after joint 1"):
-        chain_of(model, model.getFrameId("end"))

@@ -27,9 +27,26 @@ from tvist_plant.user_file import UserFileError
 
 from .arms import changed
 
-TEXT = (resources.files("tvist_plant") / "robots" / "ur5e.toml").read_text(encoding="utf-8")
+
+def file_of(name):
+    return (resources.files("tvist_plant") / "robots" / f"{name}.toml").read_text(encoding="utf-8")
+
+
+TEXT = file_of("ur5e")
 MASS = "mass = [3.761, 8.058, 2.846, 1.37, 1.3, 0.365]"
 NAMES = 'joints = ["base", "shoulder", "elbow", "wrist_1", "wrist_2", "wrist_3"]'
+
+
+def refusal(path, text):
+    """Return the sentence with which a robot file of this text is refused."""
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(DescriptionError) as refused:
+        load(path)
+    sentence = str(refused.value)
+    assert isinstance(refused.value, UserFileError)
+    assert path.name in sentence
+    assert "\n" not in sentence
+    return sentence
 
 
 def test_robot_file_by_path_equals_the_robot_by_name(tmp_path, ur5e):
@@ -78,14 +95,7 @@ def test_robot_file_by_path_equals_the_robot_by_name(tmp_path, ur5e):
 )
 def test_invalid_robot_file_is_refused_with_file_and_key(tmp_path, old, new, key):
     assert TEXT.count(old) == 1
-    file = tmp_path / "wrong.toml"
-    file.write_text(TEXT.replace(old, new), encoding="utf-8")
-    with pytest.raises(DescriptionError) as refused:
-        load(file)
-    sentence = str(refused.value)
-    assert "wrong.toml" in sentence
-    assert key in sentence
-    assert "\n" not in sentence
+    assert key in refusal(tmp_path / "wrong.toml", TEXT.replace(old, new))
 
 
 def test_unknown_robot_lists_the_known_ones():
@@ -111,13 +121,9 @@ def test_unreadable_robot_file_is_named(tmp_path):
     ],
 )
 def test_limits_in_degrees_are_refused_with_the_value_in_radians(tmp_path, key, degrees, said):
-    file = tmp_path / "degrees.toml"
     text, count = re.subn(rf"(\n{key} +=) \[([^,]+), [^,]+,", rf"\1 [\2, {degrees}.0,", TEXT)
     assert count == 1
-    file.write_text(text, encoding="utf-8")
-    with pytest.raises(UserFileError, match=said) as refused:
-        load(file)
-    assert "degrees.toml" in str(refused.value)
+    assert re.search(said, refusal(tmp_path / "degrees.toml", text))
 
 
 def test_impossible_moments_of_inertia_are_detected():
@@ -169,11 +175,42 @@ def test_fingerprint_ignores_names_limits_and_sensors(description):
     assert fingerprint(description) == fingerprint(UR5E)
 
 
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("hysteresis = -1", "hysteresis is -1: must be at least 0"),
+        ("hysteresis_torque = 0", "hysteresis_torque is 0: must be more than 0"),
+        ("breakaway = 0.9", "breakaway is 0.9: must be at least 1"),
+        ("stribeck_speed = 0", "stribeck_speed is 0: must be more than 0"),
+        ("soft = 0", "soft is 0: must be more than 0"),
+        ("soft = 1.5", "soft is 1.5: must be at most 1"),
+        ("soft_torque = nan", "soft_torque is nan"),
+        ("base = {stiffness = inf}", "base.stiffness is inf"),
+        ("base = {damping_time = -1e-3}", "base.damping_time is -0.001: must be at least 0"),
+        ("tilt = 1", "tilt is 1: must be at most 0.523599"),
+        ("backlash = [0.1, -1e-4]", r"backlash\[1\] is -0.0001: must be at least 0"),
+        ("torsion = 0", "torsion is 0: must be more than 0"),
+        ("hysteresi = 1", "imperfections.hysteresi is not a key"),
+        ("stiction = [0.5, 0.5, 0.5, 0.1, 0.1, -0.1]", r"stiction\[5\] is -0.1: must be at least 0"),
+        ("stiction = [0.5]", "imperfections: stiction has 1 values: must have 6, one per joint"),
+        ("stiction_load = -0.01", "stiction_load is -0.01: must be at least 0"),
+        ("stiction_speed = 0", "stiction_speed is 0: must be more than 0"),
+        ("stiction_stiffness = inf", "stiction_stiffness is inf: must be at most 1e"),
+        ("stictions = [0.5]", "imperfections.stictions is not a key"),
+        ("hysteresis = 'a'", "imperfections.hysteresis is text, 'a': must be a number"),
+        ("rotor = 0", "rotor is 0: must be more than 0"),
+        ("base = {stiff = 1}", "imperfections.base.stiff is not a key"),
+        ("base = {mass = 0}", "base.mass is 0: must be more than 0"),
+        ("backlash = [1e-4]", "imperfections: backlash has 1 values: must have 6"),
+        ("torsion = 1e4", "imperfections: torsion is 10000 N m/rad, but no link"),
+    ],
+)
+def test_invalid_imperfection_is_refused_by_name(tmp_path, line, said):
+    text = file_of("one-joint") if "torsion" in line else TEXT
+    assert re.search(said, refusal(tmp_path / "wrong.toml", f"{text}\n[imperfections]\n{line}\n"))
+
+
 UR = ("ur3e", "ur10e", "ur16e", "ur20", "ur30")
-
-
-def file_of(name):
-    return (resources.files("tvist_plant") / "robots" / f"{name}.toml").read_text(encoding="utf-8")
 
 
 def test_scaling_the_ur5e_to_itself_changes_nothing():
@@ -281,12 +318,7 @@ BRANCH = '<link name="x"/><joint name="jx" type="{}"><parent link="elbow"/><chil
 def test_urdf_that_cannot_be_simulated_is_refused(old, new, said, tmp_path):
     text = SEVEN.read_text(encoding="utf-8")
     assert old in text
-    path = tmp_path / "mine.urdf"
-    path.write_text(text.replace(old, new, 1), encoding="utf-8")
-    with pytest.raises(DescriptionError) as error:
-        load(path)
-    assert said in str(error.value)
-    assert "\n" not in str(error.value)
+    assert said in refusal(tmp_path / "mine.urdf", text.replace(old, new, 1))
 
 
 def test_asymmetric_urdf_limits_are_widened_and_recorded(tmp_path):

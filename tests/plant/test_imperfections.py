@@ -69,7 +69,8 @@ LAW = STICKS.imperfections
 
 def stiction_of(arm):
     """The stiction of the motors, and its stiffness before it breaks away."""
-    return rows(arm._arm.state, arm.description.joints).d, arm._joints.stiction_stiffness
+    *_, d, _ = rows(arm._arm.state, arm.description.joints)
+    return d, arm._joints.stiction_stiffness
 
 
 @pytest.mark.parametrize("start", [-1.0, 0.4, 3.0])

@@ -18,7 +18,7 @@ from .reference import commands, runge_kutta
 ALL = Imperfections(breakaway=1.5, hysteresis=0.3, soft=0.75, base=YieldingBase())
 TICKS = 1400
 """Q1 to Q3 takes 2.5153 s; the rest is ring-down."""
-RK = 350
+RK = 250
 """Of these, ticks that are compared with Runge-Kutta, which is slow."""
 
 

@@ -105,18 +105,15 @@ def test_yielding_base_can_be_pushed(arm):
     assert one._q[1] - before == pytest.approx(150.0 / 1.5e5, rel=1e-2)
 
 
-@pytest.mark.parametrize(("arguments", "said"), [
-    ({"body": "nose"}, "body is 'nose': must be one of base, shoulder, .*flange"),
-    ({"body": "flange", "force": (1.0, 2.0)}, "force is .1.0, 2.0.: must be three finite"),
-    ({"body": "flange", "moment": (0.0, np.nan, 0.0)}, "moment is"),
-    ({"body": "flange", "point": (0.0, np.inf, 0.0)}, "point is"),
+@pytest.mark.parametrize(("method", "arguments", "said"), [
+    ("push_body", {"body": "nose"}, "body is 'nose': must be one of base, shoulder, .*flange"),
+    ("push_body", {"body": "flange", "force": (1.0, 2.0)}, "force is .1.0, 2.0.: must be three finite"),
+    ("push_body", {"body": "flange", "moment": (0.0, np.nan, 0.0)}, "moment is"),
+    ("push_body", {"body": "flange", "point": (0.0, np.inf, 0.0)}, "point is"),
+    ("push", {"torque": np.ones(5)}, "torque is .*: must be 6 finite numbers"),
+    ("push", {"torque": np.array(1.0)}, "torque is .*: must be 6 finite numbers"),
+    ("push", {"torque": np.array([1.0, np.nan, 0.0, 0.0, 0.0, 0.0])}, "torque is .*: must be 6 finite numbers"),
 ])  # fmt: skip
-def test_invalid_wrench_is_refused(ur5e, arguments, said):
+def test_invalid_push_is_refused(ur5e, method, arguments, said):
     with pytest.raises(ValueError, match=said):
-        FlexibleArm(ur5e, ur5e.payload).push_body(**arguments)
-
-
-@pytest.mark.parametrize("torque", [np.ones(5), np.array(1.0), np.array([1.0, np.nan, 0.0, 0.0, 0.0, 0.0])])
-def test_invalid_torques_are_refused(ur5e, torque):
-    with pytest.raises(ValueError, match=r"torque is .*: must be 6 finite numbers"):
-        FlexibleArm(ur5e, ur5e.payload).push(torque)
+        getattr(FlexibleArm(ur5e, ur5e.payload), method)(**arguments)

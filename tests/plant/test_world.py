@@ -290,14 +290,7 @@ def test_equal_runs_are_equal_bit_for_bit_after_a_reset(tmp_path, ur5e):
         arm.reset(still(DOWN), seed=3)
         at = arm.places()
         measured = [arm.step(command) for command in moving(DOWN, 60)]
-        runs.append(
-            (
-                at,
-                np.array([one.wrench for one in measured]),
-                np.array([one.q for one in measured]),
-                arm.places(),
-            )
-        )
+        runs.append((at, [one.wrench for one in measured], [one.q for one in measured], arm.places()))
     for first, second in zip(*runs, strict=True):
         np.testing.assert_array_equal(first, second)
 

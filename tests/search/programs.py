@@ -50,14 +50,6 @@ class ProgramSequence(Sequence):
         self.done.append(text)
         return text
 
-    def run_program(self):
-        """Start a program."""
-        return self.robot.send(p.ProgramRun, text=self.text())
-
-    def run_beside(self):
-        """Start a secondary program."""
-        return self.robot.send(p.ProgramRun, text=self.text(secondary=True))
-
     def load_program(self):
         """Load a program, and play it."""
         text = self.text()
@@ -123,8 +115,8 @@ def _noted(name, send):
 
 
 _PROGRAMS: dict[str, tuple[float, Callable[[ProgramSequence], object]]] = {
-    "program_run": (30.0, ProgramSequence.run_program),
-    "program_beside": (3.0, ProgramSequence.run_beside),
+    "program_run": (30.0, lambda it: it.robot.send(p.ProgramRun, text=it.text())),
+    "program_beside": (3.0, lambda it: it.robot.send(p.ProgramRun, text=it.text(secondary=True))),
     "program_load": (6.0, ProgramSequence.load_program),
     "program_play": (10.0, lambda it: it.robot.send(p.ProgramPlay)),
     "program_pause": (5.0, lambda it: it.robot.send(p.ProgramPause)),

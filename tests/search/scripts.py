@@ -101,11 +101,8 @@ class Author:
         xd = self._random.uniform(-0.4, 0.4, 6) * (self._random.random() > 0.15)
         return [f"speedl({xd.round(3).tolist()}, {self._random.uniform(0.3, 4.0):.3f}{self._time()})"]
 
-    def stopj(self):
-        return [f"stopj({10 ** self._random.uniform(-1, 1.6):.3f})"]
-
-    def stopl(self):
-        return [f"stopl({10 ** self._random.uniform(-1, 1.0):.3f})"]
+    def stop(self, name, most):
+        return [f"{name}({10 ** self._random.uniform(-1, most):.3f})"]
 
     def write(self):
         number = int(self._random.integers(4))
@@ -124,15 +121,6 @@ class Author:
 
     def tool(self):
         return [f"set_tcp(p[0, 0, {self._random.uniform(0.0, 0.2):.3f}, 0, 0, 0])"]
-
-    def protective_stop(self):
-        return ["protective_stop()"]
-
-    def endless(self):
-        return ["while True:", "  count = count + 1", "end"]
-
-    def halt(self):
-        return ["halt"]
 
     def critical(self):
         return ["enter_critical", *self.write(), *self.sleep(), "exit_critical"]
@@ -171,11 +159,12 @@ def _indented(lines):
 _MOVING: tuple[tuple[float, Callable[[Author], list[str]]], ...] = (
     (5.0, Author.movej), (4.0, Author.movel), (2.0, Author.movep), (2.0, Author.movec), (2.0, Author.path),
     (3.0, Author.servoj), (2.0, Author.servoc), (3.0, Author.speedj), (3.0, Author.speedl),
-    (2.0, Author.stopj), (1.0, Author.stopl),
+    (2.0, lambda its: its.stop("stopj", 1.6)), (1.0, lambda its: its.stop("stopl", 1.0)),
 )  # fmt: skip
 """Statements that move the arm, and their relative frequencies."""
 _STILL: tuple[tuple[float, Callable[[Author], list[str]]], ...] = (
     (2.0, Author.write), (3.0, Author.sleep), (1.0, Author.payload), (0.5, Author.tool),
-    (0.5, Author.protective_stop), (0.3, Author.endless), (0.3, Author.halt), (0.5, Author.critical),
+    (0.5, lambda _: ["protective_stop()"]), (0.3, lambda _: ["while True:", "  count = count + 1", "end"]),
+    (0.3, lambda _: ["halt"]), (0.5, Author.critical),
 )  # fmt: skip
 """Statements that do not move the arm, and their relative frequencies."""

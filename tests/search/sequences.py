@@ -290,12 +290,6 @@ class Sequence:
             self._excused = collisions.meeting(self.robot.references[-1]) is not None
         return reply
 
-    def speed(self):
-        return self.robot.send(c.SetSpeed, fraction=float(self._random.uniform(0.05, 1.0)))
-
-    def shaper(self):
-        return self.robot.send(c.SetShaper, name=draws.shaper(self.description, self._random))
-
     def estimator(self):
         if self._random.random() < 0.2:
             return self.robot.send(c.SetEstimator, name="modal")
@@ -352,9 +346,9 @@ SENT: dict[str, tuple[float, Callable[[Sequence], object]]] = {
     "stop": (5.0, Sequence.halt),
     "pause": (2.0, lambda it: it.robot.send(c.Pause)),
     "resume": (3.0, lambda it: it.robot.send(c.Resume)),
-    "speed": (2.0, Sequence.speed),
+    "speed": (2.0, lambda it: it.robot.send(c.SetSpeed, fraction=it._random.uniform(0.05, 1.0))),
     "payload": (3.0, Sequence.payload),
-    "shaper": (3.0, Sequence.shaper),
+    "shaper": (3.0, lambda it: it.robot.send(c.SetShaper, name=draws.shaper(it.description, it._random))),
     "estimator": (1.0, Sequence.estimator),
     "power_on": (9.0, lambda it: it.robot.send(c.PowerOn)),
     "power_off": (1.0, lambda it: it.robot.send(c.PowerOff)),

@@ -88,12 +88,9 @@ def tool_speed(robot, random):
     )
 
 
-def joint_stop(robot, random):
-    return robot.send(m.StopJ, acceleration=float(10 ** random.uniform(-1, 1.6)))
-
-
-def tool_stop(robot, random):
-    return robot.send(m.StopL, acceleration=float(10 ** random.uniform(-1, 1.0)))
+def stop(kind, most):
+    """Return what sends a stop with a deceleration from 0.1 to 10 to the power of `most`."""
+    return lambda robot, random: robot.send(kind, acceleration=float(10 ** random.uniform(-1, most)))
 
 
 SENT: dict[str, tuple[float, Callable[[Subject, Random], Reply]]] = {
@@ -103,7 +100,7 @@ SENT: dict[str, tuple[float, Callable[[Subject, Random], Reply]]] = {
     "servo_j": (4.0, servo),
     "speed_j": (4.0, joint_speed),
     "speed_l": (4.0, tool_speed),
-    "stop_j": (2.0, joint_stop),
-    "stop_l": (2.0, tool_stop),
+    "stop_j": (2.0, stop(m.StopJ, 1.6)),
+    "stop_l": (2.0, stop(m.StopL, 1.0)),
 }
 """Commands and their relative frequencies."""

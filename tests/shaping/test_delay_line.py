@@ -100,7 +100,10 @@ def test_delay_beyond_the_line_is_refused_without_output(delay):
     assert (out == 5.0).all()
 
 
-@pytest.mark.parametrize(("joints", "capacity"), [(0, 10), (1, 3)])
-def test_line_too_short_to_interpolate_is_refused(joints, capacity):
-    with pytest.raises(ShapingError, match="joints >= 1 and capacity >= 4"):
-        DelayLine(joints, capacity)
+@pytest.mark.parametrize(
+    ("size", "said"),
+    [((0, 10), "joints is 0: must be at least 1"), ((1, 3), "capacity is 3: must be at least 4")],
+)
+def test_line_too_short_to_interpolate_is_refused(size, said):
+    with pytest.raises(ShapingError, match=said):
+        DelayLine(*size)

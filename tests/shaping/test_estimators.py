@@ -5,8 +5,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from tvist_shaping import EstimatorError, Fixed, Polynomial, terms
-from tvist_shaping.estimators.basis import BasisFunctions
+from tvist_shaping import EstimatorError, Polynomial, terms
 from tvist_shaping.estimators.polynomial import MARGIN, saturate
 
 WIDE = {"f_d_range": (1e-3, 1e3), "zeta_range": (0.0, 0.99)}
@@ -16,7 +15,7 @@ configurations = st.lists(st.floats(-6.3, 6.3), min_size=6, max_size=6)
 def polynomial(degree=2, joints=(1, 2, 3), seed=0, **changes):
     """Random coefficients around 100 Hz and 0.5, well inside wide ranges."""
     random = np.random.default_rng(seed)
-    n = len(BasisFunctions(joints, degree))
+    n = terms(np.zeros((1, 7)), joints=joints, degree=degree).size
     parameters = {
         "joints": joints,
         "degree": degree,
@@ -25,17 +24,6 @@ def polynomial(degree=2, joints=(1, 2, 3), seed=0, **changes):
         **WIDE,
     }
     return Polynomial(**(parameters | changes)), parameters
-
-
-@pytest.mark.parametrize(("f_d", "zeta", "field"), [
-    ([], [], "f_d"), (7.0, 0.1, "f_d"), ([0.0], [0.1], "f_d"), ([math.nan], [0.1], "f_d"),
-    ([math.inf], [0.1], "f_d"), ([7.0], [0.1, 0.1], "zeta"), ([7.0], [-0.1], "zeta"), ([7.0], [1.0], "zeta"),
-    ([7.0], [math.nan], "zeta"),
-])  # fmt: skip
-def test_invalid_fixed_modes_are_refused_by_name(f_d, zeta, field):
-    with pytest.raises(EstimatorError, match=f"{field} is") as error:
-        Fixed(f_d, zeta)
-    assert error.value.field == field
 
 
 def test_terms_are_all_combinations_up_to_the_degree_once():
@@ -56,7 +44,6 @@ def test_kernel_equals_the_design_matrix_times_the_coefficients(q, degree):
         made = estimator.estimate(np.array(q))
         assert made[0][0] == pytest.approx(f_d, rel=1e-11)
         assert made[1][0] == pytest.approx(zeta, rel=1e-11)
-        assert not estimator.saturating
 
 
 def wave(**changes):
@@ -68,13 +55,11 @@ def wave(**changes):
 
 
 @given(st.floats(-1e6, 1e6))
-def test_estimate_is_clamped_to_its_range_and_reports_saturation(q):
-    estimator, wanted = wave(), 10.5 + 20.0 * math.sin(q)
+def test_estimate_is_clamped_to_its_range(q):
+    estimator = wave()
     f_d, _ = estimator.estimate(np.array([q]))
     assert estimator.f_d_min == 6.0 <= f_d[0] <= 15.0
     assert estimator.zeta_max == 0.5
-    assume(min(abs(wanted - 6.0), abs(wanted - 15.0)) > 1e-9)  # two sines differ by rounding
-    assert estimator.saturating == (not 6.0 <= wanted <= 15.0)
 
 
 @given(st.floats(6.0, 15.0))
@@ -97,24 +82,6 @@ def test_saturation_has_two_continuous_derivatives():
     assert np.abs(np.diff(curvature)).max() < 10.0 * step / width**2 + 1e-6
     assert slope.min() >= -1e-9
     assert slope.max() <= 1.0 + 1e-9
-
-
-@pytest.mark.parametrize(("changes", "field"), [
-    ({"joints": ()}, "joints"), ({"joints": (1, 1)}, "joints"), ({"joints": (-1,)}, "joints"),
-    ({"joints": (7,)}, "joints"), ({"degree": -1}, "degree"), ({"degree": 1.5}, "degree"),
-    ({"degree": 10**9}, "degree"), ({"degree": 30}, "degree"), ({"centre": [0.0]}, "centre"),
-    ({"centre": [0.0, math.nan, 0.0]}, "centre"), ({"f_d_coefficients": [10.0]}, "f_d_coefficients"),
-    ({"zeta_coefficients": [math.nan] * 25}, "zeta_coefficients"), ({"f_d_range": (6.0,)}, "f_d_range"),
-    ({"f_d_range": (15.0, 6.0)}, "f_d_range"), ({"f_d_range": (0.0, 6.0)}, "f_d_range"),
-    ({"f_d_range": (6.0, math.inf)}, "f_d_range"), ({"zeta_range": (-0.1, 0.3)}, "zeta_range"),
-    ({"zeta_range": (0.1, 1.0)}, "zeta_range"),
-])  # fmt: skip
-def test_invalid_polynomial_parameters_are_refused_by_name(changes, field):
-    with pytest.raises(EstimatorError, match=f"^{field} is") as error:
-        polynomial(**changes) if not changes.keys() & {"joints", "degree"} else Polynomial(
-            **polynomial()[1] | changes
-        )
-    assert error.value.field == field
 
 
 def test_configuration_with_too_few_joints_is_refused():

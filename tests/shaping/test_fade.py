@@ -188,15 +188,6 @@ def test_filter_that_takes_over_continues_the_history():
             np.testing.assert_array_equal(late.filter(x), there.filter(x))
 
 
-@pytest.mark.parametrize(
-    "limits", [{"velocity": 0.0}, {"acceleration": float("nan")}, {"jerk": float("inf")}]
-)
-def test_fade_limits_out_of_range_are_refused_by_name(limits):
-    old, new = (TvistFilter(shaper("zv"), Fixed([7.0], [0.1]), joints=1) for _ in range(2))
-    with pytest.raises(FilterError, match=next(iter(limits))):
-        fade(old, new, **limits)
-
-
 def test_incompatible_filters_are_refused():
     one, two = (TvistFilter(shaper("zv"), Fixed([7.0], [0.1]), joints=joints) for joints in (1, 2))
     with pytest.raises(ShapingError, match="joints is 1: must be 2"):

@@ -172,23 +172,6 @@ def test_shaper_beyond_its_declared_duration_or_peak_is_refused(field, declared)
         check_shaper(mine)
 
 
-@pytest.mark.parametrize(
-    "changes", [{"taps": 0}, {"taps": 501}, {"modes": 0}, {"peak": 0.5}, {"period": 0.0}]
-)
-def test_fir_shaper_with_an_invalid_declaration_is_refused(changes):
-    with pytest.raises(DesignError, match=next(iter(changes))):
-        FirShaper(**({"name": "mine", "description": "", "function": zv, "taps": 20} | changes))
-
-
-@pytest.mark.parametrize("changes", [
-    {"duration_periods": "0.5"}, {"duration_periods": np.nan}, {"zeta_max": 1.5}, {"zeta_max": 0}, {"peak": 0.5},
-])  # fmt: skip
-def test_shaper_with_an_invalid_declaration_is_refused(changes):
-    values = {"name": "mine", "description": "", "function": zv, "duration_periods": 0.5} | changes
-    with pytest.raises(DesignError, match=next(iter(changes))):
-        check_shaper(Shaper(**values))
-
-
 def turned(kind, name):
     """A filter whose function can be told to fail, and that function."""
     if kind == "taps":

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tvist_shaping import SHAPERS, Estimator, Fade, FilterError, Fixed, TvistFilter, product, residual, zv
+from tvist_shaping import SHAPERS, Estimator, Fade, Fixed, TvistFilter, product, residual, zv
 from tvist_shaping.fir import FirDesign
 from tvist_shaping.impulse_train import Impulses
 from tvist_shaping.steady import ProductDesign, ShortDesign, SteadyFilter
@@ -199,22 +199,6 @@ def test_unsolved_programme_keeps_the_old_taps_and_is_reported():
     for _ in range(8):
         tvist.filter([0.0])
     assert not tvist.clipped
-
-
-@pytest.mark.parametrize(("make", "field"), [
-    (lambda: ProductDesign(0.0), "mean_delay"), (lambda: ProductDesign(0.3), "mean_delay"),
-    (lambda: ProductDesign(float("nan")), "mean_delay"), (lambda: ProductDesign(0.05, modes=0), "modes"),
-    (lambda: ProductDesign(0.05, modes=7), "modes"),
-    (lambda: ProductDesign(0.05, longest=float("inf")), "longest"),
-    (lambda: ProductDesign(0.05, period=0.0), "period"), (lambda: ShortDesign(0.045), "mean_delay"),
-    (lambda: SteadyFilter(ProductDesign(0.05), Fixed([7.0], [0.1]), joints=1), "modes"),
-    (lambda: SteadyFilter(ProductDesign(0.05, modes=1), Fixed([7.0], [0.1]), joints=0), "joints"),
-    (lambda: SteadyFilter(ProductDesign(0.05, modes=1), Fixed([7.0], [0.1]), joints=1, smooth=0), "smooth"),
-])  # fmt: skip
-def test_invalid_arguments_are_refused_by_name(make, field):
-    with pytest.raises(FilterError) as error:
-        make()
-    assert error.value.field == field
 
 
 @pytest.mark.parametrize("kind", KINDS)

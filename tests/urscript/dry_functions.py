@@ -13,7 +13,7 @@ class DryFunctions:
         self.said, outputs = [], {}
         given = {
             "textmsg": lambda s1, s2="": self.said.append(short(to_str(s1) + to_str(s2))),
-            "sync": _sync,
+            "sync": sync,
             "sleep": _sleep,
             "get_digital_in": lambda n: False,  # noqa: ARG005  no input is set
             "get_digital_out": lambda n: outputs.get(n, False),
@@ -21,10 +21,10 @@ class DryFunctions:
         }
         self.signatures = {name: signature(function) for name, function in given.items()}
         self.signatures["movej"] = Signature(parameters("q", a=1.4, v=1.05, t=0, r=0), blocks=True)
-        self.functions = {**given, "movej": lambda *_: _sync()}
+        self.functions = {**given, "movej": lambda *_: sync()}
 
 
-def _sync():
+def sync():
     yield
 
 

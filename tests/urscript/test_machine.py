@@ -16,6 +16,8 @@ from tvist_urscript.machine import OVERDRAFT, PATIENCE
 from tvist_urscript.statements import PIECE
 from tvist_urscript.threads import MOST_THREADS
 
+from .dry_functions import sync
+
 SIGNATURES = {
     "say": Signature(parameters("value")),
     "sync": Signature((), blocks=True),
@@ -33,7 +35,7 @@ class Robot:
         self.closed = []
         functions = {
             "say": lambda value: self.said.append(to_str(value)),
-            "sync": self.sync,
+            "sync": sync,
             "move": self.move,
             "fail": self.fail,
             "costly": lambda: 0,
@@ -41,9 +43,6 @@ class Robot:
         self.machine = Machine(
             compile_script(f"def program(): {script}\nend", SIGNATURES), functions, **keywords
         )
-
-    def sync(self):
-        yield
 
     def move(self, target, speed):
         try:
@@ -194,10 +193,6 @@ def test_a_thread_without_a_turn_runs_first_in_the_next_tick():
         "while True:\n sync()\nend\nend",
         {"note": Signature(parameters("x")), "sync": Signature((), blocks=True)},
     )
-
-    def sync():
-        yield
-
     machine = Machine(script, {"note": order.append, "sync": sync})
     machine.resume(100)
     assert order == [1]
@@ -273,13 +268,10 @@ class Added:
             self.last,
             {
                 "say": lambda value: self.said.append(to_str(value)),
-                "sync": self.sync,
+                "sync": sync,
                 "interpret": self.interpret,
             },
         )
-
-    def sync(self):
-        yield
 
     def interpret(self):
         while True:

@@ -64,7 +64,7 @@ class Builder(Transformer[Token, Any]):
         if len(found[1]) > 10 or int(found[1]) > HIGHEST:
             raise no_program(token, f"the number of a label is at most {HIGHEST}")
         if len(to_bytes(found[2])) > LONGEST_TEXT:
-            raise no_program(token, f"a text is too long, the limit is {LONGEST_TEXT} bytes")
+            raise no_program(token, f"a text is too long: the limit is {LONGEST_TEXT} bytes")
         return tree.Label(token.line, token.column, int(found[1]), found[2])
 
     def assign(self, *parts: Any) -> tree.Assign:
@@ -134,7 +134,7 @@ class Builder(Transformer[Token, Any]):
     def text(self, token: Any) -> tree.Constant:
         value = str(token)[1:-1]
         if len(to_bytes(value)) > LONGEST_TEXT:
-            raise no_program(token, f"a text is too long, the limit is {LONGEST_TEXT} bytes")
+            raise no_program(token, f"a text is too long: the limit is {LONGEST_TEXT} bytes")
         return tree.Constant(token.line, token.column, value)
 
     def constant(self, token: Any) -> tree.Constant:
@@ -144,8 +144,7 @@ class Builder(Transformer[Token, Any]):
         return tree.Name(token.line, token.column, str(token))
 
     def call(self, name: Any, *arguments: Any) -> tree.Call:
-        node = tree.Call(name.line, name.column, str(name), [*arguments])
-        return _deeper(node, arguments)
+        return _deeper(tree.Call(name.line, name.column, str(name), [*arguments]), arguments)
 
     def run(self, _: Any, call: Any) -> tree.Call:
         call.runs = True

@@ -140,8 +140,7 @@ class Expressions:
             return self.call_built_in(value, BUILT_IN_ARRAYS[array][0], indices)
         self.cost += 1
         function = "element" if len(indices) == 1 else "element_of_matrix"
-        made = call(function, self.value(value), *(self.value(index) for index in indices))
-        return located(made, first(indices[0]))
+        return located(call(function, *map(self.value, (value, *indices))), first(indices[0]))
 
     def pose(self, numbers: list[tree.Expression]) -> ast.expr:
         self.cost += 1
@@ -162,8 +161,7 @@ class Expressions:
             self.report(node, name_not_found(name))
             return ast.Constant(None)
         given = [tree.Argument(argument.line, argument.column, None, argument) for argument in arguments]
-        made = self.call(tree.Call(node.line, node.column, name, given), built_in=True)
-        return located(made, node)
+        return located(self.call(tree.Call(node.line, node.column, name, given), built_in=True), node)
 
     def call(self, node: tree.Call, *, built_in: bool = False) -> ast.expr:
         """Translate a call; functions of the script hide those of the controller."""

@@ -75,9 +75,8 @@ class Functions(Statements):
         )
         statements, _ = self.block(body, 0)
         declared: list[ast.stmt] = [ast.Global(sorted(self.globals))] if self.globals else []
-        charged = charge(1 + len(defaults), check=True)
-        inner = [*declared, *charged, too_deep, *defaults, *statements]
-        return _definition(function, title, parameters, inner)
+        begun = [*declared, *charge(1 + len(defaults), check=True), too_deep, *defaults]
+        return _definition(function, title, parameters, begun + statements)
 
     def parameters(self, function: tree.Function) -> list[str]:
         """Check the parameters of a function and return their names in Python."""

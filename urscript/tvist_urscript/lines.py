@@ -65,7 +65,7 @@ class Lines:
             elif kind in _CLOSES and brackets > 0:
                 brackets -= 1
             elif kind == "NAME" and len(token) > LONGEST_NAME:
-                why = f"a name of {len(token)} characters is too long, the limit is {LONGEST_NAME}"
+                why = f"a name of {len(token)} characters is too long: the limit is {LONGEST_NAME}"
                 raise no_program(token, why)
             yield token
             last = kind

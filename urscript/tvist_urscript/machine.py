@@ -1,7 +1,7 @@
 """Run a compiled script, one tick at a time."""
 
 import sys
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator, Iterable, Mapping
 from contextlib import suppress
 from types import FrameType
 from typing import Any
@@ -55,7 +55,7 @@ class Machine:
         self.left = self.thread = self._started = 0
         self.halted = self._held = False
         self.label: tuple[int, str] | None = None
-        self._finish = finish or _nothing
+        self._finish: Callable[[], Iterable[Any]] = finish or (lambda: ())
         self._critical = CriticalSection()
         self._line = 1
         called = {
@@ -344,7 +344,3 @@ class Machine:
     def _label(self, number: int, name: str) -> None:
         if self._running is self._main:
             self.label = number, name
-
-
-def _nothing() -> Steps:
-    yield from ()

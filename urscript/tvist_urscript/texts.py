@@ -32,8 +32,7 @@ def str_empty(str: Value) -> bool:
 def str_at(src: Value, index: Value) -> str:
     """Return the byte at a position."""
     string, place = to_bytes(exactly(_TEXT, src, "src of str_at")), integer(index, "the index of str_at")
-    if not 0 <= place < len(string):
-        raise _outside(place, string)
+    _check_place(place, string)
     return to_text(string[place : place + 1])
 
 
@@ -44,7 +43,7 @@ def str_find(src: Value, target: Value, start_from: Value = 0) -> int:
         to_bytes(exactly(_TEXT, target, "target of str_find")),
     )
     start = integer(start_from, "start_from of str_find")
-    _check_start(start, string)
+    _check_place(start, string, 1)
     return string.find(wanted, start)
 
 
@@ -52,7 +51,7 @@ def str_sub(src: Value, index: Value, len: Value = -1) -> str:
     """Return a part of a string; all of the rest if the length is negative or too large."""
     string, start = to_bytes(exactly(_TEXT, src, "src of str_sub")), integer(index, "the index of str_sub")
     size = integer(len, "len of str_sub")
-    _check_start(start, string)
+    _check_place(start, string, 1)
     return to_text(string[start:] if size < 0 else string[start : start + size])
 
 
@@ -70,13 +69,10 @@ def to_num(str: Value) -> int | float:
     raise Fault(f'the text "{written[:40]}" is no number')
 
 
-def _check_start(place: int, string: bytes) -> None:
-    if not 0 <= place <= len(string):
-        raise _outside(place, string)
-
-
-def _outside(place: int, string: bytes) -> Fault:
-    return Fault(f"text index {place} is not in the text, which has {len(string)} bytes")
+def _check_place(place: int, string: bytes, beyond: int = 0) -> None:
+    """Raise Fault unless a place is in a string, or by at most `beyond` bytes behind it."""
+    if not 0 <= place < len(string) + beyond:
+        raise Fault(f"text index {place} is not in the text, which has {len(string)} bytes")
 
 
 def check(condition: Value) -> None:

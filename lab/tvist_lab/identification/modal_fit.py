@@ -100,7 +100,7 @@ class _Signal:
         here, columns, L = self.left(poles), [], len(self.mass)
         for step in DIFFERENCE_STEP * np.eye(len(logarithms)):
             drivetrain = arm.drivetrain(logarithms + step)
-            moved, scratch = poles.copy(), np.zeros((L + len(poles), L + 1), dtype=complex)
+            moved, scratch = poles.copy(), np.zeros((L, L + 1), dtype=complex)
             if not follow(self.mass, drivetrain.rows, moved, shapes.copy(), scratch):
                 moved = lowest_poles(drivetrain, self.mass)
             columns.append((self.left(moved) - here) / DIFFERENCE_STEP)

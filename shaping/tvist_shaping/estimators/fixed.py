@@ -38,9 +38,6 @@ class Fixed(Estimator):
         self.modes = self._f_d.size
         self.f_d_min, self.zeta_max = float(self._f_d.min()), float(self._zeta.max())
 
-    def __repr__(self) -> str:
-        return f"Fixed(f_d={self._f_d.tolist()}, zeta={self._zeta.tolist()})"
-
     def estimate(self, q: Floats) -> tuple[Floats, Floats]:  # noqa: ARG002  the same at every q
         """Return the modes, f_d [Hz] and ζ [-], each of shape (modes,), read-only."""
         return self._f_d, self._zeta

@@ -70,12 +70,6 @@ class FlexibleJoint(Estimator):
         # Between the ends, f_d² = (K/I - D²/4I²)/4π² has no minimum, and ζ decreases with the inertia.
         self.modes, self.f_d_min, self.zeta_max = 1, min(f_d for f_d, _ in ends), ends[0][1]
 
-    def __repr__(self) -> str:
-        return (
-            f"FlexibleJoint({self._low:g} to {self._high:g} kg m², stiffness={self._stiffness:g}, "
-            f"damping={self._damping:g})"
-        )
-
     def estimate(self, q: Floats) -> tuple[Floats, Floats]:
         """Mode at a configuration; see `Estimator.estimate`."""
         inertia = float(self._inertia(q))

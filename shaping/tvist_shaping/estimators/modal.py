@@ -102,12 +102,9 @@ class Modal(Estimator):
         self._rows = drivetrain.rows
         self._poles: Complex = np.zeros(modes, dtype=complex)
         self._shapes: Complex = np.zeros((modes, size), dtype=complex)
-        self._scratch: Complex = np.zeros((size + modes, size + 1), dtype=complex)
+        self._scratch: Complex = np.zeros((size, size + 1), dtype=complex)
         self._q: Floats = np.zeros(0)
         self._lowest, self._lost = False, False
-
-    def __repr__(self) -> str:
-        return f"Modal(modes={self.modes}, f_d_min={self.f_d_min:g}, zeta_max={self.zeta_max:g})"
 
     def estimate(self, q: Floats) -> tuple[Floats, Floats]:
         """Estimate the modes at a configuration, each as the continuation of the last estimate's.
@@ -136,8 +133,14 @@ class Modal(Estimator):
         return f_d, zeta
 
     def _lie(self, q: Floats) -> int:
+        """Compare a configuration with the last one, and take its place; the first is a jump."""
         if q.shape != self._q.shape:
-            self._begin(q)
+            size, shape = len(self._rows[0]), np.shape(self._mass_matrix(q))
+            if shape != (size, size):
+                raise EstimatorError(
+                    "mass_matrix(q)", shape, f"of shape {(size, size)}, as the drivetrain is"
+                )
+            self._q = np.full(q.shape, np.inf)
         return compare(q, self._q)
 
     def _go_to(self, q: Floats) -> None:
@@ -149,8 +152,10 @@ class Modal(Estimator):
             self._take_lowest(q, mass)
             return
         self._lowest = False
+        before = self._poles.copy(), self._shapes.copy()
         self._lost = not follow(mass, self._rows, self._poles, self._shapes, self._scratch)
         if self._lost:
+            self._poles, self._shapes = before
             self._check(q, mass)
 
     def _take_lowest(self, q: Floats, mass: Floats) -> None:
@@ -170,13 +175,3 @@ class Modal(Estimator):
         if not np.isfinite(mass).all():
             self._q = np.zeros(0)
             raise EstimatorError("mass_matrix(q)", mass.tolist(), f"finite, at q = {q.tolist()}")
-
-    def _begin(self, q: Floats) -> None:
-        """Check what does not change later, and discard the last configuration."""
-        if q.ndim != 1:
-            raise EstimatorError("q", q.shape, "of shape (joints,)")
-        size = len(self.drivetrain.stiffness)
-        shape = np.shape(self._mass_matrix(q))
-        if shape != (size, size):
-            raise EstimatorError("mass_matrix(q)", shape, f"of shape {(size, size)}, as the drivetrain is")
-        self._q = np.full(q.shape, np.inf)

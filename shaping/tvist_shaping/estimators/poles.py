@@ -3,7 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from tvist_kernels.compiling import compiled, inlined
+from tvist_kernels.compiling import compiled
 from tvist_shaping._types import Floats
 
 Complex = npt.NDArray[np.complex128]
@@ -18,31 +18,13 @@ APART = 1e-7  # relative distance below which two poles may be the same one [-]
 
 
 @compiled
-def follow(mass: Floats, rows: Floats, poles: Complex, shapes: Complex, scratch: Complex) -> bool:
-    """Follow every pole by Newton's method from its last value, in place; return whether all converged apart.
-
-    Otherwise poles and shapes are not changed. `rows` are `Drivetrain.rows`; scratch has shape (L + modes, L + 1).
-    """
-    L = mass.shape[0]
-    before = scratch[L:]
-    for k in range(poles.shape[0]):
-        before[k, 0] = poles[k]
-        for i in range(L):
-            before[k, 1 + i] = shapes[k, i]
-    if _converge(mass, rows, poles, shapes, scratch[:L]):
-        return True
-    for k in range(poles.shape[0]):
-        poles[k] = before[k, 0]
-        for i in range(L):
-            shapes[k, i] = before[k, 1 + i]
-    return False
-
-
-@inlined
-def _converge(  # noqa: C901, PLR0912 - one kernel: its branches are loops over coordinates
+def follow(  # noqa: C901, PLR0912 - one kernel: its branches are loops over coordinates
     mass: Floats, rows: Floats, poles: Complex, shapes: Complex, matrix: Complex
 ) -> bool:
-    """Do the same as `follow`; after a failure, poles and shapes are invalid."""
+    """Follow every pole by Newton's method from its last value, in place; return whether all converged apart.
+
+    After a failure, poles and shapes are invalid. `rows` are `Drivetrain.rows`; `matrix` is scratch, shape (L, L + 1).
+    """
     L = mass.shape[0]
     for k in range(poles.shape[0]):
         s = poles[k]

@@ -5,36 +5,29 @@ body, and a gear is the spring of a fixed tendon between motor and joint. All th
 on one body, so that a sensor there feels the wrench between the two.
 """
 
-from typing import NamedTuple
-
 import mujoco
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from tvist_plant.description import Payload, RobotDescription, Tensor
-from tvist_plant.model import FLANGE, Floats, link_frame
+from tvist_plant.model import FLANGE, Floats, Integers, link_frame
+from tvist_plant.robot_tables import matrix
 
 LOAD = "load"  # name of the body beyond the flange: the payload, and the fingers of a gripper
 
 
-class Hinges(NamedTuple):
-    """Indices of the arm's hinges among a model's coordinates."""
-
-    joints: NDArray[np.int64]
-    motors: NDArray[np.int64]
-    flexes: NDArray[np.int64]  # virtual joints about y and z of each bending link
-
-    @classmethod
-    def of(cls, description: RobotDescription, model: "mujoco.MjModel") -> "Hinges":
-        """Find the hinges by name."""
-        numbers = range(description.joints)
-        names = (
-            [f"joint {number}" for number in numbers],
-            [f"motor {number}" for number in numbers],
-            [f"flex {number} {axis}" for number in description.link_flexibility.links for axis in "yz"],
-        )
-        return cls(*(np.array([model.joint(one).dofadr[0] for one in row], np.int64) for row in names))
+def hinges(description: RobotDescription, model: "mujoco.MjModel") -> tuple[Integers, Integers, Integers]:
+    """Return the coordinates of joints, motors and virtual joints, y and z of each bending link."""
+    numbers = range(description.joints)
+    names = (
+        [f"joint {number}" for number in numbers],
+        [f"motor {number}" for number in numbers],
+        [f"flex {number} {axis}" for number in description.link_flexibility.links for axis in "yz"],
+    )
+    joints, motors, flexes = (
+        np.array([model.joint(one).dofadr[0] for one in row], np.int64) for row in names
+    )
+    return joints, motors, flexes
 
 
 def link_name(description: RobotDescription, number: int) -> str:
@@ -107,8 +100,7 @@ def arm_spec(description: RobotDescription, payload: Payload, timestep: float) -
 
 def principal(inertia: Tensor) -> tuple[list[float], list[float]]:
     """Return principal moments, above zero for MuJoCo, and their axes as a quaternion."""
-    xx, xy, xz, yy, yz, zz = inertia
-    moments, axes = np.linalg.eigh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+    moments, axes = np.linalg.eigh(matrix(inertia))
     if np.linalg.det(axes) < 0.0:
         axes = -axes
     return np.maximum(moments, 1e-9).tolist(), np.roll(pin.Quaternion(axes).coeffs(), 1).tolist()
@@ -126,7 +118,7 @@ def settle(
     description: RobotDescription, model: "mujoco.MjModel", data: "mujoco.MjData", q: Floats
 ) -> Floats:
     """Set static equilibrium with the motors at q; return the joints' gravity torques, shape (n,) [N m]."""
-    joints, motors, flexes = Hinges.of(description, model)
+    joints, motors, flexes = hinges(description, model)
     mujoco.mj_resetData(model, data)
     gravity = np.zeros(model.nv)
     for _ in range(20):

@@ -22,7 +22,7 @@ from tvist_plant.plant import PERIOD, Measurement, Plant, PlantError, PlantTruth
 from tvist_plant.sensors import Accelerometer, ForceSensor
 from tvist_plant.surroundings import Hand, Things
 from tvist_plant.world.apart import build_apart
-from tvist_plant.world.arm_form import LOAD, Hinges, arm_spec, carry, settle
+from tvist_plant.world.arm_form import LOAD, arm_spec, carry, hinges, settle
 from tvist_plant.world.contacts import PREFIX, set_contacts
 from tvist_plant.world.fingers import Fingers
 from tvist_plant.world.scene import World
@@ -65,8 +65,8 @@ def drive(
 class MujocoArm(SimulatedArm):
     """The arm in MuJoCo: deterministic, in a scene with sensor noise, a force sensor and possibly a gripper.
 
-    Raise ValueError unless `PERIOD` is a multiple of `timestep` [s] (1 ms is unstable for the UR5e), and
-    SceneError if the scene is invalid or no arm can stand in it.
+    `PERIOD` must be a multiple of `timestep` [s]; 1 ms is unstable for the UR5e. Raise SceneError if
+    the scene is invalid or no arm can stand in it.
     """
 
     def __init__(
@@ -78,8 +78,6 @@ class MujocoArm(SimulatedArm):
         timestep: float = TIMESTEP,
     ) -> None:
         self._steps = round(PERIOD / timestep)
-        if self._steps < 1 or abs(self._steps * timestep - PERIOD) > 1e-12:
-            raise ValueError(f"timestep is {timestep} s; {PERIOD} s must be a multiple of it")
         self._description, self._scene, self._timestep = description, scene, timestep
         drives, joints = description.drives, description.joints
         K_d, K_p, K_i = map(np.array, (drives.velocity_gain, drives.position_gain, drives.integral_gain))
@@ -100,7 +98,7 @@ class MujocoArm(SimulatedArm):
         self._model = model = self._world.model
         self._bodies, self._own = (np.array(own, np.int64) for own in (self._world.bodies, self._world.arm))
         self._data = data = mujoco.MjData(model)
-        self._joints, self._motors, self._flexes = Hinges.of(description, model)
+        self._joints, self._motors, self._flexes = hinges(description, model)
         self._flange, self._load = model.body(FLANGE).id, model.body(LOAD).id
         self._state = data.qpos, data.qvel, data.qfrc_applied
         self._place, self._turn = data.xpos[self._flange], data.xmat[self._flange]
@@ -139,7 +137,7 @@ class MujocoArm(SimulatedArm):
         if not math.isfinite(self._force.dot(self._force)):
             raise PlantError("the state of the arm in MuJoCo is no longer finite")
         if self._bodies.size and not np.isfinite(self._data.xpos[self._bodies]).all():
-            raise PlantError("what stands around the arm is no longer anywhere")
+            raise PlantError("the position of a body around the arm is no longer finite")
         return measured
 
     def move(self, command: DriveCommand) -> None:

@@ -62,8 +62,7 @@ def build(
     arm, mounted = frozenset(one.name for one in spec.geoms), {one.name for one in spec.bodies}
     shown = (mounted - before) | ({LOAD} if tooled else set())
     spec.attach(content, frame=spec.worldbody.add_frame(), prefix=PREFIX)
-    plain = spec.compile()
-    given = add_pairs(spec, plain, arm)
+    given = add_pairs(spec, spec.compile(), arm)
     model = spec.compile()
     set_contacts(model, given)
     check_masses(model, timestep)
