@@ -7,6 +7,7 @@ import subprocess
 import sys
 
 import pytest
+from tests import forked
 from tests.conformance.served import NOISE, PATIENCE, Served, finished, free_endpoint
 from tests.conformance.wire import Wire
 from tests.system.shell import begun
@@ -96,19 +97,19 @@ def test_sighup_that_nohup_ignores_does_not_end_a_server():
 
 
 TERMINAL = """
-import fcntl, os, sys, termios
-os.setsid()
+import fcntl, sys, termios
+from tvist_cli.main import main
 fcntl.ioctl(2, termios.TIOCSCTTY, 0)
-os.execv(sys.executable, [sys.executable, "-m", "tvist_cli", "serve", *sys.argv[1:]])
+sys.argv = ["tvist", "serve", *sys.argv[1:]]
+main()
 """
 
 
 @pytest.mark.realtime
 def test_end_of_the_terminal_ends_the_server_with_a_complete_recording(tmp_path):
-    """It cannot write its messages any more, which is no failure."""
     path, (ours, its) = tmp_path / "run.mcap", os.openpty()
     command = [sys.executable, "-c", TERMINAL, "--listen", free_endpoint(), "--record", path]
-    process = subprocess.Popen(command, stdin=its, stdout=its, stderr=its)
+    process = forked.Popen(command, stdin=its, stdout=its, stderr=its, start_new_session=True)
     os.close(its)
     said = b""
     try:
@@ -120,6 +121,17 @@ def test_end_of_the_terminal_ends_the_server_with_a_complete_recording(tmp_path)
         process.kill()
         process.wait(PATIENCE)
     assert read(path).complete
+
+
+def test_message_to_a_closed_terminal_is_no_failure():
+    """Nor is it when Python ends."""
+    ours, its = os.openpty()
+    program = "import sys; from tvist_cli.output import say; sys.stdin.read(); say('gone')"
+    process = subprocess.Popen([sys.executable, "-c", program], stdin=subprocess.PIPE, stderr=its)
+    os.close(its)
+    os.close(ours)
+    process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0
 
 
 @pytest.mark.realtime
