@@ -49,7 +49,7 @@ def run(
     if file is None:
         study = preset_study(name, options)
     else:
-        with failing_on(StudyError, OSError):
+        with failing_on(StudyError):
             study = read_study(file) if file.suffix == ".py" else swept(file)
     result = _ran(study, folder, executor)
     if folder is not None:

@@ -22,7 +22,6 @@ from tvist_client import (
 )
 from tvist_client.blocking import Robot as BlockingRobot
 from tvist_client.transports.loopback import LoopbackTransport
-from tvist_protocol.keys import check_robot_name
 
 POSE = (0.4, 0.1, 0.5, 0.0, 3.1, 0.0)
 Q1 = (0.0, -3.1, 0.0, -1.57, 0.0, 0.0)
@@ -102,9 +101,6 @@ async def test_invalid_names_and_endpoints_are_refused_with_the_expected_form(ro
     for endpoint in ("", "localhost", "127.0.0.1:7447", "tcp/x:0", "tcp/x:99999", None):
         with pytest.raises(NotConnectedError, match="tcp/<host>:<port>"):
             await Robot.connect(endpoint)
-    for name in ("UR5e", "", "a b", "ur5e/x", None):
-        with pytest.raises(ProtocolError, match="a-z 0-9"):
-            check_robot_name(name)
 
 
 def test_an_invalid_payload_raises_an_argument_error():

@@ -244,7 +244,6 @@ moves = 2
 payloads = [5]
 """
 SWEEPS = [
-    (SWEEP + "shapes = 1", ["line 4", "'shapes'", "did you mean 'shapers'?"]),
     (SWEEP.replace("zv", "zvv"), ["shapers[0]", "'zvv'", "did you mean"]),
     (SWEEP + "robots = ['ur5']", ["robots[0]", "'ur5'", "one-joint, ur10e"]),
     (SWEEP + "robots = [{robot = 'ur5e', calibration = 'x'}]", ["shapers[0] with robots[0]", "calibration 'x'"]),
