@@ -2,6 +2,7 @@
 
 import ipaddress
 import os
+import re
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -18,6 +19,8 @@ SLACK = timedelta(hours=1)  # how far the clock of a client or robot may be behi
 USAGES = {"robot": ExtendedKeyUsageOID.SERVER_AUTH, "client": ExtendedKeyUsageOID.CLIENT_AUTH}
 """Extended key usage of each kind: a client's certificate cannot pass as a robot's, or the reverse."""
 
+LABEL = re.compile(r"(?!-)(?=.*[A-Za-z0-9])[A-Za-z0-9_-]{1,63}")  # part of a host name between dots
+
 Host = x509.DNSName | x509.IPAddress
 
 
@@ -31,7 +34,7 @@ def host_of(text: str) -> Host:
         return x509.IPAddress(ipaddress.ip_address(text))
     except ValueError:
         labels = text.split(".")
-        if len(text) > 253 or not all(_is_label(label) for label in labels) or labels[-1].isdigit():
+        if len(text) > 253 or not all(map(LABEL.fullmatch, labels)) or labels[-1].isdigit():
             raise ValueError(
                 f"host is {text!r:.80}: must be a name such as robot.lab, or an IP address"
             ) from None
@@ -80,7 +83,7 @@ class CertificateAuthority(KeyPair):
         """Read an existing authority; raise CertificateError if the key does not belong to the certificate."""
         pair = cls(read_certificate(certificate), _read_key(key))
         if pair.certificate.public_key() != pair.key.public_key():
-            raise CertificateError(f"{key} is not the key of {certificate}")
+            raise CertificateError(f"{key} is not the key of {certificate}: put that one there")
         return pair
 
     def issue(
@@ -103,7 +106,9 @@ class CertificateAuthority(KeyPair):
             builder = builder.add_extension(x509.SubjectAlternativeName(hosts), critical=False)
         pair = KeyPair(builder.sign(self.key, hashes.SHA256()), key)
         if pair.until > self.until:
-            raise CertificateError(f"days is {days}: the authority itself expires on {self.until:%Y-%m-%d}")
+            raise CertificateError(
+                f"days is {days}: must end before the authority does, on {self.until:%Y-%m-%d}"
+            )
         return pair
 
 
@@ -176,8 +181,3 @@ def _key_usage(*, signs_certificates: bool) -> x509.KeyUsage:
         encipher_only=False,
         decipher_only=False,
     )
-
-
-def _is_label(label: str) -> bool:
-    inner = label.replace("-", "").replace("_", "")
-    return label.isascii() and inner.isalnum() and len(label) <= 63 and not label.startswith("-")

@@ -33,7 +33,7 @@ def compile_shown(processes: int | None, tell: Callable[[int, int], None] = lamb
         def show(done: int, total: int) -> None:
             nonlocal said, shown
             tell(done, total)
-            advance(done - shown, None)
+            advance(done - shown)
             if not err.is_terminal and done > shown and time.monotonic() - said >= SAY_EVERY:
                 say(f"{done} of {total} kernels are compiled")
                 said = time.monotonic()

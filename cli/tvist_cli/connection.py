@@ -8,7 +8,6 @@ from typing import TypeVar
 
 from cyclopts import Parameter
 
-from tvist_cli.failure import failing_on
 from tvist_client.readiness import unlock_command
 from tvist_client.robot import ENDPOINT, NAME, Robot
 from tvist_client.transports.zenoh import only_robot
@@ -34,14 +33,13 @@ class Connection:
         return await Robot.connect(self.endpoint, name, security=self.security, namespace=self.namespace)
 
     def run(self, use: Callable[[Robot], Awaitable[T]]) -> T:
-        """Connect to the robot and return the result of `use`; raise Failure if it is not there or refuses."""
+        """Connect to the robot and return the result of `use`."""
 
         async def used() -> T:
             async with await self.robot() as robot:
                 return await use(robot)
 
-        with failing_on():
-            return asyncio.run(used())
+        return asyncio.run(used())
 
     def unlock_command(self, name: str) -> str:
         """Return the command line that unlocks the robot of this name."""

@@ -4,9 +4,9 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from tvist_client.errors import ClientError
 from tvist_plant.user_file import UserFileError
 from tvist_protocol.errors import ProtocolError, TvistError, one_line
+from tvist_server.option_values import StartError
 
 
 class Failure(Exception):  # noqa: N818  the plain word for it
@@ -53,18 +53,21 @@ def check_range(
 
 @contextmanager
 def failing_on(*errors: type[Exception], exit_code: int = 1, where: str = "") -> Iterator[None]:
-    """Turn errors of these types, and those of client and protocol, into a `Failure` with the same message.
+    """Turn errors of these types, of the house and of a robot's options into a `Failure` with the same message.
 
-    A file that exists but has the wrong content always gives exit code 1, whatever `exit_code` is. `where` precedes the
-    message, also that of a `Failure` in the body, which then has `exit_code`.
+    Whatever `exit_code` is, a file that exists but has the wrong content gives 1, and an invalid option
+    of a robot 2, unless `StartError` is among `errors`. `where` precedes the message, also that of a
+    `Failure` in the body, which then has `exit_code`.
     """
-    kinds: tuple[type[Exception], ...] = (*errors, ClientError, TvistError, *((Failure,) if where else ()))
+    kinds: tuple[type[Exception], ...] = (*errors, TvistError, StartError)
+    kinds += (Failure,) if where else ()
     try:
         yield
     except UserFileError as error:
         raise Failure(f"{where}{one_line(str(error))}") from error
     except kinds as error:
-        raise Failure(f"{where}{one_line(_message(error))}", code=exit_code) from error
+        code = 2 if isinstance(error, StartError) and StartError not in errors else exit_code
+        raise Failure(f"{where}{one_line(_message(error))}", code=code) from error
 
 
 def _message(error: Exception) -> str:

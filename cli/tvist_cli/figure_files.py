@@ -37,6 +37,12 @@ class FigureOptions:
         with house_style(*self.style or ()):
             yield lambda figure, name: save(figure, folder / f"{name}.{self.format or 'png'}")
 
+    def write(self, folder: Path | None, draw: Callable[[], "Mapping[str, Figure]"]) -> None:
+        """Draw figures and write them to a folder under their names, unless it is None."""
+        if folder is not None:
+            with self.into(folder) as save:
+                write(save, draw())
+
     def check(self, folder: Path | None, *files: Path | None, option: str = "--figures") -> None:
         """Raise Failure, before anything is computed, if figures or other output files cannot be written as requested.
 

@@ -5,10 +5,11 @@ import sys
 from collections.abc import AsyncIterator, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager, nullcontext
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from tvist_cli.connection import Connection
 from tvist_cli.failure import Failure, Misuse, failing_on
-from tvist_cli.figure_files import FigureOptions, write
+from tvist_cli.figure_files import FigureOptions
 from tvist_cli.identified import angles, report, report_payload, report_twin
 from tvist_cli.output import err, say, table, typed, waiting
 from tvist_client.arm import Arm
@@ -23,15 +24,17 @@ from tvist_lab.identification.ring_downs import Log, Progress
 from tvist_lab.identification.twin import fit_twin
 from tvist_lab.identification.twin_file import twin_file
 from tvist_lab.in_process import free_setup, robot_in_process
-from tvist_lab.recordings import RecordingError, read
+from tvist_lab.recordings import read
 from tvist_lab.served import ServedError, served_robot
 from tvist_lab.whole_file import write_whole
 from tvist_plant.description import DescriptionError, RobotDescription, load, robots
 from tvist_protocol import RefusedError, RobotMode
 from tvist_protocol.calibration import calibration_to_json
 from tvist_server.config import from_mapping
-from tvist_server.option_values import StartError
 from tvist_server.watching.address import place_of
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 ROBOT = "ur5e"  # robot that is identified unless another one is named
 READY = 30.0  # longest wait for the robot to follow set-points [s]
@@ -57,7 +60,7 @@ def from_logs(
         [*files, *checks], robot, None if masses is None else masses[0], columns, len(files)
     )
     measured = RingDownLogs(tuple(logs))
-    with failing_on(RecordingError, OSError), waiting("identifying") as step:
+    with waiting("identifying") as step:
         if twin:
             made = fit_twin(arm, logs[: len(files)], logs[len(files) :], step)
             write_whole(output, twin_file(made, typed()).encode())
@@ -66,8 +69,7 @@ def from_logs(
     if twin:
         report_twin(made, output, json=json)
         return
-    if figures is not None:
-        _draw(found, look, figures, arm, None)
+    look.write(figures, lambda: _figures(found, arm, None))
     named = robot or arm.robot.name
     report(found, measured, output, "" if named == ROBOT else f" --robot {named}", None, json=json)
 
@@ -115,7 +117,7 @@ class MovableRobot:
                 "clock": "free",
                 "seed": seed,
             }
-            with failing_on(StartError, ValueError, exit_code=2):
+            with failing_on(ValueError, exit_code=2):
                 self._setup = free_setup(from_mapping(content, "options"))
                 check_rating(self._setup.payload, self._setup.description)
 
@@ -130,7 +132,7 @@ class MovableRobot:
                     await control.set_payload(new.mass, new.com, new.inertia)
             report_payload(found, declared=declare, json=json)
 
-        with failing_on(OSError), waiting("weighing") as step:
+        with waiting("weighing") as step:
             asyncio.run(run(step))
 
     def identify(self, output: Path, figures: Path | None, look: FigureOptions, *, json: bool) -> None:
@@ -160,14 +162,13 @@ class MovableRobot:
 
         # The question to the user needs the screen.
         shown = nullcontext(say) if self._positions else waiting("identifying")
-        with failing_on(ServedError, OSError, RecordingError), shown as step:
+        with failing_on(ServedError), shown as step:
             arm, measured = asyncio.run(run(step))
             found = _calibrated(arm, measured, output, step)
         payloads, true = found.forecast.arm.payloads, None
         if self._setup is not None:
             true = true_errors(arm, found.calibration, payloads, self._seed, found.modes)
-        if figures is not None:
-            _draw(found, look, figures, arm, true)
+        look.write(figures, lambda: _figures(found, arm, true))
         options = f" --robot {self._robot}" if self._robot not in {None, ROBOT} else ""
         if self._positions:
             options = f" --robot {self._robot or ROBOT} --plant {self._source}"
@@ -213,8 +214,7 @@ def _robot_logs(
     known: int,
 ) -> tuple[RobotDescription, list[Log]]:
     """Read logs; return the robot's description and the logs with their payloads."""
-    with failing_on(RecordingError):
-        recordings = [read(file, columns) for file in files]
+    recordings = [read(file, columns) for file in files]
     for file, recording in zip(files, recordings, strict=True):
         for note in recording.notes:
             say(f"{file}: {note}")
@@ -224,26 +224,21 @@ def _robot_logs(
     return description, [Log(str(file), one, payload) for file, one in zip(files, recordings, strict=True)]
 
 
-def _draw(
-    found: Found, look: FigureOptions, folder: Path, arm: RobotDescription, true: list[ModeErrors] | None
-) -> None:
+def _figures(found: Found, arm: RobotDescription, true: list[ModeErrors] | None) -> "dict[str, Figure]":
     """Draw the measured modes and, if the truth is known, maps of the lowest one over the workspace."""
     from tvist_lab.figures import identified_figure, workspace_map_figure
     from tvist_lab.identification.workspace_map import QUANTITIES, workspace_map
 
     measured, fitted = found.lowest_mode
     mass = found.calibration.payload.mass
-    maps = None if true is None else workspace_map(arm, found.calibration, mass)
     words = f"{arm.robot.name}, {mass:g} kg, calibration {found.calibration.name}"
-    with look.into(folder) as save:
-        drawn = {}
-        if measured.size:
-            drawn["identification"] = identified_figure(found.calibration.name, measured, fitted)
-        if maps is not None:
-            drawn |= {
-                f"map_{name}": workspace_map_figure(maps, key, words) for key, name in QUANTITIES.items()
-            }
-        write(save, drawn)
+    drawn = {}
+    if measured.size:
+        drawn["identification"] = identified_figure(found.calibration.name, measured, fitted)
+    maps = None if true is None else workspace_map(arm, found.calibration, mass)
+    if maps is not None:
+        drawn |= {f"map_{name}": workspace_map_figure(maps, key, words) for key, name in QUANTITIES.items()}
+    return drawn
 
 
 async def _agreed_jogs(
@@ -255,8 +250,10 @@ async def _agreed_jogs(
     with house_style():
         save(move_plan_figure(plan), picture)
     _show(plan, picture)
-    if not sure and not await asyncio.to_thread(_agreed):
-        raise Failure("nothing was moved")
+    if not sure:
+        say("Is there nothing in the way, and somebody at the emergency stop? Move the arm [y/N]")
+        if (await asyncio.to_thread(sys.stdin.readline)).strip().lower() not in {"y", "yes"}:
+            raise Failure("nothing was moved")
     stops: list[str | None] = []
     client.on_event(lambda event: stops.append(event.why) if event.kind.endswith("_stop") else None)
     async with client.control("identify") as control:
@@ -303,8 +300,3 @@ def _show(plan: JogPlan, picture: Path) -> None:
     say(
         f"No joint is faster than {plan.speed:.2f} rad/s; it takes about {plan.seconds:.0f} s. Drawn in {picture}"
     )
-
-
-def _agreed() -> bool:
-    say("Is there nothing in the way, and somebody at the emergency stop? Move the arm [y/N]")
-    return sys.stdin.readline().strip().lower() in ("y", "yes")

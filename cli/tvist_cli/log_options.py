@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from tvist_cli.failure import Misuse, failing_on
+from tvist_cli.failure import Misuse
 from tvist_cli.offered import ROBOTS
 
 if TYPE_CHECKING:
@@ -32,11 +32,11 @@ class LogOptions:
     path of a robot file [that of the log, or ur5e]."""
 
     def read(self, *files: Path, sensor: bool = False) -> "list[Recording]":
-        """Read logs and join each with its sensor's log; raise Failure if a file or an option does not fit.
+        """Read logs and join each with its sensor's log; RecordingError or Misuse if one does not fit.
 
         If `sensor` is true, a log without `--imu` may be that of an accelerometer alone.
         """
-        from tvist_lab.recordings import RecordingError, read
+        from tvist_lab.recordings import read
         from tvist_lab.recordings.table import ROBOT, ROBOT_OR_SENSOR
 
         for name in ("imu_columns", "robot"):
@@ -45,16 +45,14 @@ class LogOptions:
         if self.imu is not None and len(self.imu) != len(files):
             raise Misuse(f"{len(self.imu)} --imu for {len(files)} logs: give one for each")
         needs = ROBOT_OR_SENSOR if sensor and self.imu is None else ROBOT
-        with failing_on(RecordingError):
-            logs = [read(file, self.columns, needs) for file in files]
-            if self.imu is None:
-                return logs
-            from tvist_lab.recordings.joined import joined
+        logs = [read(file, self.columns, needs) for file in files]
+        if self.imu is None:
+            return logs
+        from tvist_lab.recordings.joined import joined
 
-            return [
-                joined(log, imu, self.imu_columns, self.robot)
-                for log, imu in zip(logs, self.imu, strict=True)
-            ]
+        return [
+            joined(log, imu, self.imu_columns, self.robot) for log, imu in zip(logs, self.imu, strict=True)
+        ]
 
 
 AS_IT_IS = LogOptions()

@@ -109,9 +109,7 @@ def application(called: Sequence[str] = ()) -> "cyclopts.App":
     )
     _add(app, "tvist_cli.commands", COMMANDS, called[:1])
     for name, commands in OF_GROUPS.items():
-        group = cyclopts.App(
-            name=name, help=COMMANDS[name], sort_key=list(COMMANDS).index(name), help_epilogue=_example(name)
-        )
+        group = cyclopts.App(name=name, help=COMMANDS[name], sort_key=list(COMMANDS).index(name))
         app.command(group)
         _add(group, f"tvist_cli.commands.{name}", commands, called[1:2] if called[:1] == [name] else ())
     return app
@@ -140,21 +138,17 @@ def examples() -> dict[str, str]:
     return tomllib.loads(Path(__file__).with_name("examples.toml").read_text(encoding="utf-8"))
 
 
-def _example(command: str) -> str | None:
-    return f"Example: `{examples()[command]}`" if command in examples() else None
-
-
 def _add(app: "cyclopts.App", package: str, commands: Mapping[str, str], called: Sequence[str]) -> None:
     for place, (name, what) in enumerate(commands.items()):
-        if name in OF_GROUPS:
-            continue
-        app.command(
-            f"{package}.{name}:{name}",
-            name=name,
-            help=None if name in called else what,
-            help_epilogue=_example(" ".join([*package.split(".")[2:], name])),
-            sort_key=place,
-        )
+        if name not in OF_GROUPS:
+            example = examples()[" ".join([*package.split(".")[2:], name])]
+            app.command(
+                f"{package}.{name}:{name}",
+                name=name,
+                help=None if name in called else what,
+                help_epilogue=f"Example: `{example}`",
+                sort_key=place,
+            )
 
 
 def _run() -> None:
@@ -189,7 +183,7 @@ def _run() -> None:
     warnings.formatwarning = lambda message, *_, **__: harmless(f"tvist: {message}\n")
     app = application(sys.argv[1:3])
     try:
-        with failing_on(OSError):  # a folder for figures that is none, mostly
+        with failing_on(OSError):  # what no command gives another exit code
             app(readable(sys.argv[1:]), exit_on_error=False, print_error=False)
     except cyclopts.CycloptsError as error:
         group = (error.command_chain or ("",))[0]

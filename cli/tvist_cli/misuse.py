@@ -96,10 +96,6 @@ def _near(name: str, known: Sequence[str]) -> str:
     return f"did you mean {found[0]}? " if found else ""
 
 
-def _positional(error: CycloptsError) -> bool:
-    return error.argument is not None and error.argument.index is not None
-
-
 def _name(error: CycloptsError) -> str:
     token = getattr(error, "token", None)
     if token is not None and token.keyword:
@@ -107,7 +103,7 @@ def _name(error: CycloptsError) -> str:
     if error.argument is None:
         return "a value"
     name = str(error.argument.name)
-    return name.removeprefix("--") if _positional(error) else name
+    return name if error.argument.index is None else name.removeprefix("--")
 
 
 def _wanted(kind: object) -> str:

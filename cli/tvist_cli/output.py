@@ -4,7 +4,7 @@ import os
 import shlex
 import shutil
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
@@ -71,6 +71,15 @@ def print_json(value: Any) -> None:
     print(HARMFUL.sub(lambda found: f"\\u{ord(found[0]):04x}", text))
 
 
+def print_lines(value: Any, lines: Iterable[str], *, json: bool) -> None:
+    """Print a result as one JSON object, or as lines for people, which may contain paths to copy."""
+    if json:
+        print_json(value)
+        return
+    for line in lines:
+        out.print(line, soft_wrap=True)
+
+
 @contextmanager
 def waiting(what: str) -> Iterator[Callable[[str], None]]:
     """Show on a terminal what the program waits for; yield a function that changes the text."""
@@ -82,10 +91,8 @@ def waiting(what: str) -> Iterator[Callable[[str], None]]:
 
 
 @contextmanager
-def progress(
-    total: int, what: str, kept: str = "nothing was written"
-) -> Iterator[Callable[[int, str | None], None]]:
-    """Show a progress bar on a terminal; yield a function that advances and optionally renames it.
+def progress(total: int, what: str, kept: str = "nothing was written") -> Iterator[Callable[..., None]]:
+    """Show a progress bar on a terminal; yield a function that advances it and may rename it.
 
     `what` names the steps in the plural; `kept` tells what remains after Control+C.
     """
@@ -93,7 +100,7 @@ def progress(
 
     done = 0
 
-    def advance(steps: int, name: str | None) -> None:
+    def advance(steps: int = 1, name: str | None = None) -> None:
         nonlocal done
         done += steps
         bar.update(task, advance=steps, description=name or what)
@@ -112,17 +119,18 @@ def progress(
             raise interrupted(f"{done} of {total} {what} were done; {kept}") from None
 
 
-def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]], on: Console = out) -> None:
-    """Print a table with text aligned left and numbers right."""
+def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], on: Console = out) -> None:
+    """Print a table with text aligned left and numbers right, each cell on one line."""
     # A table wider than the screen is printed in parts, one below the other, each with the first column.
     from rich.table import Table
 
     on.print(Text(title, style="bold"))
-    for part in _parts(columns, rows):
+    cells = [[cell.replace("\n", " ") for cell in row] for row in rows]
+    for part in _parts(columns, cells):
         drawn = Table(show_edge=False, pad_edge=False)
         for number in part:
             drawn.add_column(columns[number], no_wrap=number == 0, justify="left" if number == 0 else "right")
-        for row in rows:
+        for row in cells:
             drawn.add_row(*(row[number] for number in part))
         on.print(drawn)
         on.print()

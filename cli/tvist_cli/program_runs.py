@@ -22,11 +22,8 @@ from tvist_lab.programs.watch import ProgramMessage, ProgramWatch
 from tvist_plant.user_file import LARGEST, UserFileError
 from tvist_protocol.errors import harmless
 from tvist_server.config import ServeConfig
-from tvist_server.gateways.base import GatewayError
-from tvist_server.option_values import StartError
 from tvist_server.polyscope.files import read_program
 from tvist_server.program_folder import SCRIPT, URP
-from tvist_server.recording import RecorderError
 from tvist_server.server import Server
 from tvist_server.shutdown import Shutdown
 
@@ -52,8 +49,9 @@ def read_script(file: Path, skip: Sequence[str] = ()) -> str:
         try:
             return content.decode()
         except UnicodeDecodeError as error:
-            why = f"the standard input is not text in UTF-8 ({error.reason} at byte {error.start})"
-            raise Misuse(why) from error
+            raise Misuse(
+                f"the standard input is not text in UTF-8 ({error.reason} at byte {error.start})"
+            ) from error
     with failing_on(OSError, exit_code=2):
         try:
             return read_program(file, frozenset(skip))
@@ -196,9 +194,8 @@ class Runner:
             return ProgramOutcome(result, failure=text)
         if (refused := _refused(file, text)) is not None:
             return refused
-        lockstep = self.config.clock == "free"
-        errors, server = list[str](), None
-        with failing_on(StartError, InputError, exit_code=2), failing_on(GatewayError, RecorderError):
+        lockstep, errors, server = self.config.clock == "free", list[str](), None
+        with failing_on(InputError, exit_code=2), failing_on():
             if lockstep:
                 watch = self._in_lockstep(text, errors)
             else:
@@ -208,17 +205,20 @@ class Runner:
         result = {
             "file": named(file), "lockstep": lockstep, "recording": self.config.record, **as_dict(watch)
         }  # fmt: skip
-        exceeded, misplaced = [*broken(self.limits, watch)], missed(self.limits, watch.plant)
-        changed = [] if self.baseline is None else [*changes(self.baseline[named(file)], result)]
-        failures = [*_ended(watch, errors), *exceeded, *misplaced, *changed]
+        differing = [] if self.baseline is None else changes(self.baseline[named(file)], result)
+        found = {
+            ("broke", "limit"): [*broken(self.limits, watch)],
+            ("missed", "expectation"): missed(self.limits, watch.plant),
+            ("differs from the baseline in", "point"): [*differing],
+        }
+        judged = [one for some in found.values() for one in some]
+        failures = [*_ended(watch, errors), *judged]
         result |= {"ok": not failures, "failures": [asdict(one) for one in failures]}
         failure = _failure(file, watch, errors)
-        for one in (*exceeded, *misplaced, *changed):
+        for one in judged:
             say(f"{named(file)}:{'' if one.line is None else f'{one.line}:'} {one.text}")
         if failure is None and failures:
-            parts = [f"broke {counted(len(exceeded), 'limit')}"] if exceeded else []
-            parts += [f"missed {counted(len(misplaced), 'expectation')}"] if misplaced else []
-            parts += [f"differs from the baseline in {counted(len(changed), 'point')}"] if changed else []
+            parts = (f"{does} {counted(len(some), what)}" for (does, what), some in found.items() if some)
             failure = Failure(f"{named(file)} {' and '.join(parts)}")
         return ProgramOutcome(result, summary(watch), failure, server)
 

@@ -8,11 +8,11 @@ from cyclopts import Group, Parameter
 from msgspec import inspect as types
 from msgspec.structs import FieldInfo, fields
 
-from tvist_cli.failure import Misuse, failing_on
+from tvist_cli.failure import Misuse
 from tvist_cli.misuse import lower
 from tvist_cli.offered import PLANTS, PROFILES, ROBOTS, SHAPERS, WORLDS
 from tvist_protocol.schema import field_docs
-from tvist_server.option_values import StartError, read_start_file
+from tvist_server.option_values import read_start_file
 from tvist_server.options import ServeOptions
 
 if TYPE_CHECKING:
@@ -64,12 +64,11 @@ def with_robot_options(only: Collection[str] = ()) -> Callable[[Command], Comman
 
 
 def configuration(given: Mapping[str, Any], file: str | None, **defaults: object) -> "ServeConfig":
-    """Merge command line, file and `defaults`, in this order of precedence; raise Failure if a value is invalid."""
+    """Merge command line, file and `defaults`, in this order of precedence; StartError if a value is invalid."""
     from tvist_server.config import from_mapping
 
     source = "configuration" if file is None else f"configuration {file}"
-    with failing_on(StartError, exit_code=2):
-        return from_mapping(defaults | content_of(file) | dict(_plain(given)), source)
+    return from_mapping(defaults | content_of(file) | dict(_plain(given)), source)
 
 
 def content_of(file: str | None) -> dict[str, object]:

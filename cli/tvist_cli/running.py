@@ -15,8 +15,6 @@ from tvist_lab.programs.limits import RunLimits
 from tvist_lab.programs.results import junit as junit_of
 from tvist_lab.whole_file import write_whole
 from tvist_server.config import ServeConfig
-from tvist_server.option_values import StartError
-from tvist_server.server import Server
 
 
 def run_programs(
@@ -52,63 +50,52 @@ def run_programs(
     results = [one.result for one in ran]
     failure = ran[0].failure if len(file) == 1 else _of_several(ran, len(file))
     if json:
-        print_json(results[0] if len(file) == 1 else _together(results, failure))
+        together = {
+            "ok": failure is None,
+            "failed": sum(not result["ok"] for result in results),
+            "seconds": round(sum(result.get("seconds", 0.0) for result in results), 6),
+            "programs": results,
+        }
+        print_json(results[0] if len(file) == 1 else together)
     elif failure is None:
         say(ran[0].account if len(file) == 1 else f"{len(file)} programs ran as they should")
     if junit is not None:
-        with failing_on(OSError):
-            write_whole(junit, junit_of(results))
+        write_whole(junit, junit_of(results))
         say(f"the results are in {junit}")
     sys.stdout.flush()
-    _leave(ran[0].server, failure)
-    if failure is not None:
-        raise failure
-
-
-def _leave(server: Server | None, failure: Failure | None) -> None:
-    """End the process here if the network would keep it running."""
-    if server is not None and not server.left:
+    server = ran[0].server
+    if server is not None and not server.left:  # the network would keep the process running
         if failure is not None:
             say(f"tvist: {failure}")
         leave(server, 0 if failure is None else failure.code)
+    if failure is not None:
+        raise failure
 
 
 def _run_all(runner: Runner, files: Sequence[Path], texts: Sequence[str | Failure]) -> list[ProgramOutcome]:
     """Run programs one after the other; if there are several, print at once how each ended."""
     ran: list[ProgramOutcome] = []
+    several = len(files) > 1
     for number, (file, text) in enumerate(zip(files, texts, strict=True), 1):
-        if len(files) > 1:
-            runner.tell.which = f"{number} of {len(files)}: "
+        runner.tell.which = f"{number} of {len(files)}: " if several else ""
         ran.append(runner.run(file, text))
         failure = ran[-1].failure
-        if len(files) > 1:
+        if several:
             say(f"{named(file)}: {ran[-1].account}" if failure is None else f"{failure}")
         if failure is not None and failure.code == 130:
             break
     return ran
 
 
-def _together(results: list[dict[str, Any]], failure: Failure | None) -> dict[str, Any]:
-    """Return what --json prints of several programs."""
-    return {
-        "ok": failure is None,
-        "failed": sum(not result["ok"] for result in results),
-        "seconds": round(sum(result.get("seconds", 0.0) for result in results), 6),
-        "programs": results,
-    }
-
-
 def _of_several(ran: Sequence[ProgramOutcome], count: int) -> Failure | None:
     """Return why the runs of several programs failed; None if none failed."""
-    failed = [one for one in ran if one.failure is not None]
+    failed = {one.result["file"]: one.failure for one in ran if one.failure is not None}
     if not failed:
         return None
-    last = failed[-1].failure
-    assert last is not None
+    *_, last = failed.values()
     if last.code == 130:
         return Failure(f"{last}; {len(ran) - 1} of {count} programs had ended", code=130)
-    names = ", ".join(one.result["file"] for one in failed)
-    return Failure(f"{len(failed)} of {count} programs failed: {names}")
+    return Failure(f"{len(failed)} of {count} programs failed: {', '.join(failed)}")
 
 
 def _check_files(files: Sequence[Path], *, lockstep: bool) -> None:
@@ -128,7 +115,7 @@ def _check_written(junit: Path | None, baseline: Path | None) -> None:
         return
     if junit.is_dir() or not junit.parent.is_dir():
         why = "that is a folder" if junit.is_dir() else f"there is no folder {junit.parent}"
-        raise Misuse(f"junit is {junit}: {why}")
+        raise Misuse(f"junit is {junit}, but {why}: give a file in a folder that exists")
     if baseline is not None and junit.absolute() == baseline.absolute():
         raise Misuse("junit and baseline are the same file: give each its own")
 
@@ -146,8 +133,7 @@ def _configuration(given: dict[str, Any], file: str | None, *, lockstep: bool) -
         if lockstep and name in given:
             option = name.replace("_", "-")
             raise Misuse(f"--lockstep and --{option} exclude each other: in lockstep there is no network")
-    with failing_on(StartError, exit_code=2):
-        content = content_of(file)
+    content = content_of(file)
     for key, instead in (("robots", "tvist run has one robot"), ("clock", "tvist run has --lockstep")):
         if key in content:
             raise Misuse(f"configuration {file}: leave {key} out, since {instead}")

@@ -2,12 +2,14 @@
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tvist_cli.failure import Misuse, failing_on
-from tvist_cli.output import number, out, table
+from tvist_cli.figure_files import FigureOptions
+from tvist_cli.output import number, out, table, write_json
 from tvist_cli.shapers_of import of_impulses
-from tvist_cli.studying import ResultFiles, print_result
+from tvist_cli.studying import print_result
 
 if TYPE_CHECKING:
     from tvist_shaping import Shaper
@@ -18,7 +20,14 @@ POINTS = 401
 
 
 def print_sensitivity(
-    shapers: Sequence[str], zeta: float, errors: tuple[float, float], places: ResultFiles, *, json: bool
+    shapers: Sequence[str],
+    zeta: float,
+    errors: tuple[float, float],
+    output: Path | None,
+    figures: Path | None,
+    look: FigureOptions,
+    *,
+    json: bool,
 ) -> None:
     """Compute and print the residual vibration of shapers for a mode whose frequency they assume wrongly."""
     import numpy as np
@@ -41,8 +50,10 @@ def print_sensitivity(
             about = _about(shaper, zeta)
         curves.append({**about, "residual_percent": (100.0 * left).tolist()})
     result = {"zeta": zeta, "error_percent": (100.0 * span).tolist(), "shapers": curves}
-    places.write(result, lambda: {"sensitivity": sensitivity_figure(chosen, zeta, span)})
-    print_result(result, lambda _: _print(chosen, zeta, curves), json=json)
+    if output is not None:
+        write_json(output, result)
+    look.write(figures, lambda: {"sensitivity": sensitivity_figure(chosen, zeta, span)})
+    print_result(result, lambda: _print(chosen, zeta, curves), json=json)
 
 
 def _print(shapers: "list[Shaper]", zeta: float, curves: list[dict[str, Any]]) -> None:

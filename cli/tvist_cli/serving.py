@@ -6,31 +6,25 @@ import time
 from collections.abc import Sequence
 
 from tvist_cli.compiling import compile_if_new, compile_shown
-from tvist_cli.failure import Failure, check_range, failing_on
+from tvist_cli.failure import Failure, check_range
 from tvist_cli.main import BEGAN
 from tvist_cli.output import say
 from tvist_controller.setup import Setup
 from tvist_server.config import ServeConfig
-from tvist_server.gateways.base import GatewayError
-from tvist_server.kernels import KernelsError
-from tvist_server.option_values import StartError
-from tvist_server.recording import RecorderError
 from tvist_server.server import RecordingResult, Server
 from tvist_server.shutdown import Shutdown
-from tvist_server.workers import Workers, WorkersError
+from tvist_server.workers import Workers
 
 
 def serve_robots(config: ServeConfig) -> None:
     """Serve robots until a signal ends this process."""
-    with failing_on(StartError, exit_code=2):
-        ending = Shutdown()
-        if config.workers > 1:
-            _several(config, ending)
-            return
-        # From here on, a signal must raise an exception, so that the server is closed.
-        with failing_on(GatewayError, RecorderError), ending.at_once():
-            server = Server(config, prepare=compile_if_new)
-
+    ending = Shutdown()
+    if config.workers > 1:
+        _several(config, ending)
+        return
+    # From here on, a signal must raise an exception, so that the server is closed.
+    with ending.at_once():
+        server = Server(config, prepare=compile_if_new)
     setups = [robot.setup for robot in server.robots]
 
     def ready() -> None:
@@ -52,21 +46,19 @@ def serve_robots(config: ServeConfig) -> None:
 def compile_all(processes: int | None = None) -> None:
     """Compile ahead in this number of processes."""
     check_range("compile", processes, 1)
-    with failing_on(KernelsError):
-        compile_shown(processes)
+    compile_shown(processes)
     say(f"everything is compiled, after {time.monotonic() - BEGAN:.0f} s")
 
 
 def _several(config: ServeConfig, ending: Shutdown) -> None:
-    with failing_on(WorkersError, GatewayError):
-        with ending.at_once():
-            workers = Workers(config, compile_if_new)
-        say_who_can_reach(workers, config, len(workers.setups))
-        try:
-            workers.run(lambda: _say_ready(workers.setups, config), ending)
-        finally:
-            ending.close()
-            errors = say_recorded(workers.recordings)
+    with ending.at_once():
+        workers = Workers(config, compile_if_new)
+    say_who_can_reach(workers, config, len(workers.setups))
+    try:
+        workers.run(lambda: _say_ready(workers.setups, config), ending)
+    finally:
+        ending.close()
+        errors = say_recorded(workers.recordings)
     if errors:
         raise Failure("; ".join(errors))
 

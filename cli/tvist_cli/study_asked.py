@@ -55,8 +55,7 @@ def preset_study(name: str, options: StudyOptions) -> Study:
         made = preset.study(asked)
         made.check()
     if options.save_moves is not None:
-        with failing_on(OSError):
-            write_moves(options.save_moves, asked.moves)
+        write_moves(options.save_moves, asked.moves)
     own = [each.sha256 for one in asked.methods if isinstance(one, Named) for each in one.recipe.own]
     files = [Path(one.path).read_bytes() for one in asked.methods if isinstance(one, FromFile)]
     contents = {
@@ -101,27 +100,24 @@ def _asked(
         kept = () if wanted == "none" else tuple(map(str.strip, wanted.split(",")))
     description = whole.disturbed_by(kept)
     given, error = None if other else options.calibration, 0.01 * options.frequency_error
-    named: list[Method] = []
+    named, others = list[Method](), list[Method]()
     for shaper in (_shaper(one) for one in options.shapers or preset.shapers if one != UNSHAPED):
         known = _calibration(given, shaper, options.modes, description, modal=preset.modal)
         named += some([shaper], description, known, masses, options.modes, error)
-    always: tuple[Method, ...] = ()
-    others: tuple[Method, ...] = ()
-    if preset.always:
-        always = some(preset.always, description, _calibration(given, "", 1, description, modal=True))
     if preset.defaults is not None and (options.baselines or options.shapers is None):
         if preset.defaults != "baselines":
             known = _calibration(given, "", 1, description, modal=True)
-            others = some(names(preset.defaults), description, known, masses)
+            others += some(names(preset.defaults), description, known, masses)
         elif calibrated := _calibrations(named):
-            others = baselines(calibrated[0], description, masses, error)
+            others += baselines(calibrated[0], description, masses, error)
+    always = list[Method]()
+    if preset.always:
+        always += some(preset.always, description, _calibration(given, "", 1, description, modal=True))
     methods = {one.name: one for one in (*always, *named, *others)}
     for one in methods.values():  # an error here comes before anything is computed
         if isinstance(one, Named):
             one.recipe.elastic(description, one.recipe.make(description, masses[1]))
-    share = None
-    if not other:
-        moves, share = _moves(options, whole, masses, preset.least)
+    moves, share = (moves, None) if other else _moves(options, whole, masses, preset.least)
     calibration = next(iter(_calibrations(list(methods.values()))), None)
     facts = {
         "command": _command(name, options), "seed": options.seed, "robot": whole.robot.name,
@@ -165,8 +161,9 @@ def _calibration(
     name = shaper.name if isinstance(shaper, OwnShaper) else shaper
     known = Registry(one.shaper for one in own)
     try:
-        several = modal or wanted_modes(name, modes, "shaper", known) > 1
-        several = several or known.feed_forward_of(name) != "rigid"
+        several = (
+            modal or wanted_modes(name, modes, "shaper", known) > 1 or known.feed_forward_of(name) != "rigid"
+        )
     except RefusalError:  # not a shaper of the library; `some` refuses an unknown name
         several = modal = True
     if given is not None:
@@ -175,10 +172,10 @@ def _calibration(
             raise Misuse(f"calibration {found.name} has no modal model: make one with tvist identify")
         return found
     default = calibrations.default_for(description.robot.model)
+    if default is None and modal:
+        model = description.robot.model
+        raise Misuse(f"the package has no calibration of a {model}: give --calibration FILE")
     if default is None:
-        if modal:
-            model = description.robot.model
-            raise Misuse(f"the package has no calibration of a {model}: give --calibration FILE")
         return None
     calibration = calibrations.load(default)
     source = modal_source(description, calibration) if several else None
@@ -239,15 +236,15 @@ def _notes(
     streams: bool,
 ) -> list[str]:
     found = []
-    if share is None and not streams:
+    if share is not None:
+        free = f"{100.0 * share:.0f} % of the drawn moves were free of collisions; the others were replaced"
+        found.append("all drawn moves were free of collisions" if share == 1.0 else free)
+    elif not streams:
         found += [
             f"move {place}: a robot would refuse it because {words}; it was made anyway"
             for place, words in enumerate(collisions(description, moves), 1)
             if words is not None
         ]
-    elif share is not None:
-        free = f"{100.0 * share:.0f} % of the drawn moves were free of collisions; the others were replaced"
-        found.append("all drawn moves were free of collisions" if share == 1.0 else free)
     for one in known:
         off = sum(abs(move.mass - one.payload.mass) > 0.02 * max(one.payload.mass, 1.0) for move in moves)
         if one.modal is None and off:

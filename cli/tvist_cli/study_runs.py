@@ -11,7 +11,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from tvist_cli.failure import Failure, Misuse, check_range, failing_on
-from tvist_cli.figure_files import FigureOptions, write
+from tvist_cli.figure_files import FigureOptions
 from tvist_cli.output import out, print_json, progress, say, table, typed, words, write_json, write_report
 from tvist_cli.study_asked import preset_study, swept
 from tvist_cli.study_options import StudyOptions
@@ -49,18 +49,15 @@ def run(
     if file is None:
         study = preset_study(name, options)
     else:
-        with failing_on(StudyError, OSError):
+        with failing_on(StudyError):
             study = read_study(file) if file.suffix == ".py" else swept(file)
     result = _ran(study, folder, executor)
-    with failing_on(OSError):
-        if folder is not None:
-            write_json(folder / "result.json", result.values)
-        if report is not None:
-            with house_style():
-                write_report(report, study_page(result, study_figures(result), typed()))
-        if figures is not None:
-            with look.into(figures) as save:
-                write(save, {name: figure for name, (figure, _) in study_figures(result).items()})
+    if folder is not None:
+        write_json(folder / "result.json", result.values)
+    if report is not None:
+        with house_style():
+            write_report(report, study_page(result, study_figures(result), typed()))
+    look.write(figures, lambda: {name: figure for name, (figure, _) in study_figures(result).items()})
     _tell(result, json=json)
 
 
@@ -73,9 +70,11 @@ def _executor(
     if number is not None:
         check_range("processes", number, 1, 1024)
         return lambda: some_processes(number)
-    if scheduler is not None and not ADDRESS.fullmatch(scheduler):
+    if scheduler is None:
+        return None
+    if not ADDRESS.fullmatch(scheduler):
         raise Misuse(f"scheduler is {scheduler!r}: must be an address such as tcp://HOST:8786")
-    return None if scheduler is None else lambda: _cluster(scheduler)
+    return lambda: _cluster(scheduler)
 
 
 @contextmanager
@@ -87,7 +86,7 @@ def _cluster(scheduler: str) -> Iterator[Executor]:
     try:
         client = Client(scheduler, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError) as error:
-        raise ConnectionError(f"no Dask scheduler answers at {scheduler}") from error
+        raise ConnectionError(f"no Dask scheduler answers at {scheduler}: check that it runs") from error
     with client:
         try:
             client.wait_for_workers(1, timeout=PATIENCE)
@@ -110,17 +109,10 @@ def _ran(
     kept = (
         "nothing was kept" if folder is None else f"they are kept in {folder}, and the same command continues"
     )
-
-    @contextmanager
-    def bar(missing: int) -> Iterator[Callable[[int], None]]:
-        with progress(missing, "moves", kept) as advance:
-            yield lambda done: advance(done, None)
-
-    with failing_on(OSError):
-        try:
-            ran = engine.run(study, folder, executor, bar)
-        except ChildProcessError as error:
-            raise ChildProcessError(f"{error}; some moves are done: {kept}") from error
+    try:
+        ran = engine.run(study, folder, executor, lambda missing: progress(missing, "moves", kept))
+    except ChildProcessError as error:
+        raise ChildProcessError(f"{error}; some moves are done: {kept}") from error
     about = {
         "date": datetime.now(UTC).date().isoformat(),
         "rows": len(ran.rows),

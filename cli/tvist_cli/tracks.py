@@ -16,13 +16,11 @@ from tvist_controller.about import geometry_of
 from tvist_controller.refusal import RefusalError
 from tvist_lab.in_process import run_beside
 from tvist_lab.metrics import MeasuredRecording, pairs
-from tvist_lab.recordings import RecordingError
 from tvist_lab.recordings.mcap_file import RecordingFile, read_checked
 from tvist_plant.description import DescriptionError, RobotDescription, load
 from tvist_plant.plant import PERIOD
 from tvist_protocol.content import checked
 from tvist_protocol.values import Payload
-from tvist_server.option_values import StartError
 from tvist_view import described
 from tvist_view.beside import MotionRecord
 from tvist_view.look import Look
@@ -53,14 +51,14 @@ class Shows:
 
 def recorded(file: Path) -> Shows:
     """Return the track of a recording."""
-    with failing_on(RecordingError, ValueError):
+    with failing_on(ValueError):
         content = read_checked(file)
         return Shows(file.stem, [Track(file.stem, _look_of(content), content.states, content.truths)])
 
 
 def repeated(file: Path) -> Shows:
     """Return the recorded motion without and with the shaper that brings the tool to rest the most earlier."""
-    with failing_on(RecordingError, ValueError):
+    with failing_on(ValueError):
         content = read_checked(file)
         measured = MeasuredRecording.of(content.recording)
         found = [one for one in pairs(measured) if one.change.less_percent is not None]
@@ -93,13 +91,13 @@ def compared(shapers: Sequence[str], robot: str) -> Shows:
     compile_if_new()
     tracks, runs = [], []
     with (
-        failing_on(DescriptionError, StartError, RefusalError, exit_code=2),
+        failing_on(DescriptionError, RefusalError, exit_code=2),
         progress(len(shapers), "runs") as advance,
     ):
         poses = load(robot).poses
         named = described.pairs(list(poses))
         if not named:
-            raise Misuse(f"robot file {robot} names no two poses to move between")
+            raise Misuse(f"robot file {robot} names no two poses to move between: add poses to it")
         first, last = named[0]
         for shaper in shapers:
             info, collected = asyncio.run(run_beside(shaper, (poses[first], poses[last]), robot=robot))
@@ -108,7 +106,7 @@ def compared(shapers: Sequence[str], robot: str) -> Shows:
             look = Look(info.geometry, info.payload)
             tracks.append(Track(label, look, collected.states, collected.truths))
             runs.append(MotionRecord(collected.states, collected.truths, collected.events))
-            advance(1, None)
+            advance()
     result = None
     if len(shapers) == 2 and shapers[0] == "none":
         result = said(judge(*runs), shapers[1], f"{first} → {last}")

@@ -6,7 +6,7 @@ import sys
 
 import msgspec
 
-from tvist_client.check import CheckReport, check
+from tvist_client.check import check
 from tvist_client.robot import ENDPOINT, NAME
 from tvist_protocol.errors import harmless
 
@@ -54,15 +54,10 @@ def main(arguments: list[str] | None = None) -> int:
         wait=chosen.wait,
         tell=lambda said: sys.stderr.write(f"{said}\n"),
     )
-    text = msgspec.json.encode(report).decode() if chosen.json else describe(report)
+    lines = (f"{'ok  ' if step.ok else 'FAIL'}  {step.what:<8} {step.said}" for step in report.findings)
+    text = msgspec.json.encode(report).decode() if chosen.json else "\n".join(lines)
     sys.stdout.write(harmless(text) + "\n")
     return 0 if report.ok else 1
-
-
-def describe(report: CheckReport) -> str:
-    """Format a report for people, one line per step."""
-    lines = [f"{'ok  ' if step.ok else 'FAIL'}  {step.what:<8} {step.said}" for step in report.findings]
-    return "\n".join(lines)
 
 
 if __name__ == "__main__":

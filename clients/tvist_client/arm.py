@@ -10,8 +10,8 @@ from tvist_client.commands import Commands
 from tvist_client.connection import Connection, step
 from tvist_client.errors import AnswerTimeoutError, ClientError, ProtectiveStopError
 from tvist_client.servo import Servo
-from tvist_client.values import JointRange, whole
 from tvist_client.values import number as number_of
+from tvist_client.values import whole
 from tvist_protocol.commands import ServoStart, ServoStop, UnlockProtectiveStop
 from tvist_protocol.errors import RefusedError
 from tvist_protocol.io import SetIo, SimulationSetInputs
@@ -55,10 +55,9 @@ class Arm(Commands):
             acceleration: Acceleration to which every joint is limited [rad/s²].
             jerk: Jerk to which every joint is limited [rad/s³].
         """
-        joints = JointRange(await self.robot.info())
         asked = {"period": period, "velocity": velocity, "acceleration": acceleration, "jerk": jerk}
         start = built(ServoStart, asked, token=self.token)
-        servo = Servo(self.robot, self.token, start.period, joints)
+        servo = Servo(self.robot, self.token, start.period, await self.robot.info())
         with servo:  # receives the event of the stream's end, which may precede the answer
             await self.robot.request(start)
             try:

@@ -17,7 +17,7 @@ from tvist_protocol.errors import RefusedError, TvistError
 from tvist_protocol.info import CalibrationInfo, StopReason
 from tvist_protocol.keys import check_robot_name
 from tvist_protocol.modes import RobotMode
-from tvist_protocol.stream import State, Telemetry
+from tvist_protocol.stream import Telemetry
 from tvist_protocol.values import PROTOCOL_VERSION
 
 LISTEN_S = 1.0  # shortest time over which the rate of states is measured [s]
@@ -95,6 +95,7 @@ class _Check:
         self.endpoint, self.name, self.namespace = endpoint, name, namespace
         self.security, self.alive = security, alive
         self.report = CheckReport(ok=False, endpoint=endpoint, robot=name or "")
+        self.robot: Robot
         self.missed = ""  # how many control periods were missed
         self.early = False  # whether the robot may appear later
 
@@ -107,44 +108,43 @@ class _Check:
             report.robot = self.name or (robots[0] if robots and NAME not in robots else NAME)
             async with await Robot.connect(
                 self.endpoint, report.robot, security=self.security, namespace=self.namespace
-            ) as robot:
+            ) as self.robot:
                 others = ", ".join(other for other in robots if other != report.robot)
                 beside = f"; also there: {others}" if others else ""
-                self.passed(step, f"{report.robot} at {self.endpoint}{beside}")
+                report.findings.append(CheckResult(step, True, f"{report.robot} at {self.endpoint}{beside}"))
                 steps = [("info", self.info), ("state", self.state)]
                 if not self.alive:
                     steps += [("refusal", self.refusal), ("ready", self.ready), ("load", self.load)]
                 for step, run in steps:
-                    self.passed(step, await run(robot))
+                    report.findings.append(CheckResult(step, True, await run()))
             report.ok = True
         except TvistError as error:
             said = str(error)
             if isinstance(error, RefusedError) and error.reply.code == "starting":
                 report.starting, step, said = True, "start", error.reply.why
             self.early = report.starting or (step == "connect" and isinstance(error, NotConnectedError))
-            report.findings.append(CheckResult(step, ok=False, said=said))
+            report.findings.append(CheckResult(step, False, said))
         return report
 
-    def passed(self, what: str, said: str) -> None:
-        self.report.findings.append(CheckResult(what, ok=True, said=said))
-
-    async def info(self, robot: Robot) -> str:
-        info = await robot.info()
+    async def info(self) -> str:
+        info = await self.robot.info()
         self.report.protocol = info.protocol
         if info.protocol != PROTOCOL_VERSION:
             raise UnexpectedReplyError(
                 f"the robot speaks protocol {info.protocol}, this client {PROTOCOL_VERSION}: update the older one"
             )
-        said = f"{info.model}, {len(info.joints)} joints, clock {info.clock}, protocol {info.protocol}"
-        said += "" if info.watched is None else f"; {info.watched} is only watched"
-        return f"{said}{_doubt(info.calibration)}"
+        watched = "" if info.watched is None else f"; {info.watched} is only watched"
+        return (
+            f"{info.model}, {len(info.joints)} joints, clock {info.clock}, protocol {info.protocol}"
+            f"{watched}{_doubt(info.calibration)}"
+        )
 
-    async def state(self, robot: Robot) -> str:
-        if await robot.clock() != "realtime":
-            if (await robot.info()).tick == 0:
+    async def state(self) -> str:
+        robot, info = self.robot, await self.robot.info()
+        if info.clock != "realtime":
+            if info.tick == 0:
                 return "none yet, since a client must step the time and none has done so"
             return f"tick {(await robot.state()).tick}; no rate, since a client steps the time"
-        info = await robot.info()
         if info.watched is not None and info.robot_mode == RobotMode.DISCONNECTED:
             return f"it stands still, since {info.watched} is not connected"
         heard: list[Telemetry] = []
@@ -159,8 +159,7 @@ class _Check:
         finally:
             stop()
         last = heard[-1] if heard else None
-        due = (await robot.info()).rate_hz if last is None else last.due_per_second
-        self.report.due_per_second = due
+        self.report.due_per_second = due = info.rate_hz if last is None else last.due_per_second
         if due is None:  # an older server, whose speed is unknown
             return f"{rate:.1f} Hz"
         self.report.overloaded = ticks < TOO_SLOW * due or (last is not None and last.overloaded)
@@ -178,10 +177,10 @@ class _Check:
             )
         return f"{said}{self.missed}"
 
-    async def refusal(self, robot: Robot) -> str:
+    async def refusal(self) -> str:
         # A move to the present posture moves nothing, even if it is obeyed; nor does any before the first tick.
-        info = await robot.info()
-        ticks = await robot.clock() == "realtime" or info.tick > 0
+        robot, info = self.robot, await self.robot.info()
+        ticks = info.clock == "realtime" or info.tick > 0
         here = tuple((await robot.state()).target_q) if ticks else (0.0,) * len(info.joints)
         try:
             await robot.request(MoveJ(token=STALE, q=here))
@@ -193,9 +192,11 @@ class _Check:
             return "commands are not delivered: this certificate has the role viewer"
         raise ClientError("a command with an invalid token was accepted: the server does not check control")
 
-    async def ready(self, robot: Robot) -> str:
+    async def ready(self) -> str:
         report = self.report
-        found = await look(robot, unlock_command(self.endpoint, report.robot, self.security, self.namespace))
+        found = await look(
+            self.robot, unlock_command(self.endpoint, report.robot, self.security, self.namespace)
+        )
         report.ready, report.stop, report.next = found.ready, found.stop, found.next or None
         report.robot_mode, report.safety_mode = found.robot_mode, found.safety_mode
         if not found.ready:
@@ -204,9 +205,8 @@ class _Check:
             return "as far as is known before its first tick"
         return f"robot_mode {found.robot_mode}, safety_mode {found.safety_mode}"
 
-    async def load(self, robot: Robot) -> str:
-        del robot  # `state` has measured it
-        report = self.report
+    async def load(self) -> str:
+        report = self.report  # `state` has measured it
         if report.overloaded is None:
             return "unknown: a client steps the time, or the server is older"
         if report.overloaded:
@@ -237,13 +237,8 @@ def _doubt(calibration: CalibrationInfo | None) -> str:
 
 async def _rate(robot: Robot) -> tuple[float, float]:
     """Return received states and ticks per second, measured between two states at least `LISTEN_S` apart."""
-    loop = asyncio.get_running_loop()
-    seen: list[tuple[int, float]] = []
-
-    def on_state(state: State) -> None:
-        seen.append((state.tick, loop.time()))
-
-    stop: Callable[[], None] = robot.on_state(on_state)
+    loop, seen = asyncio.get_running_loop(), list[tuple[int, float]]()
+    stop = robot.on_state(lambda state: seen.append((state.tick, loop.time())))
     try:
         await robot.advance(1)
         await asyncio.sleep(LISTEN_S)

@@ -38,11 +38,11 @@ class Connection(Questions):
     def __init__(self, transport: Transport) -> None:
         self._transport = transport
         self._clock: Clock | None = None
-        self._states: Feed[State] = Feed(transport, "state", State, once_a_tick=True)
-        self._events: Feed[Event] = Feed(transport, "event", Event, once_a_tick=False)
-        self._truths: Feed[Truth] = Feed(transport, "truth", Truth, once_a_tick=True)
-        self._telemetries: Feed[Telemetry] = Feed(transport, "telemetry", Telemetry, once_a_tick=False)
-        self._ios: Feed[Io] = Feed(transport, "io", Io, once_a_tick=False)
+        self._states = Feed(transport, "state", State, once_a_tick=True)
+        self._events = Feed(transport, "event", Event, once_a_tick=False)
+        self._truths = Feed(transport, "truth", Truth, once_a_tick=True)
+        self._telemetries = Feed(transport, "telemetry", Telemetry, once_a_tick=False)
+        self._ios = Feed(transport, "io", Io, once_a_tick=False)
         self._feeds = (self._states, self._events, self._truths, self._telemetries, self._ios)
         self.arm: Leased | None = None
         """The arm, while this client has control."""
@@ -126,10 +126,9 @@ class Connection(Questions):
             NotConnectedError: The connection is closed, or the robot has disconnected.
         """
         self._states.subscribe()
-        clock = await self.clock()
-        if clock != "realtime" and self._states.latest is not None:
+        if await self.clock() != "realtime" and self._states.latest is not None:
             return self._states.latest
-        if clock == "free":
+        if self._clock == "free":
             raise MisuseError(
                 "this robot sends its state from the first tick on: take control and call advance(1)"
             )
@@ -201,8 +200,7 @@ class Connection(Questions):
     async def until(self, tick: int) -> State:
         """Wait until the state of a tick has arrived, without stepping time."""
         self._states.subscribe()
-        latest = self._states.latest
-        if latest is not None and latest.tick >= tick:
+        if (latest := self._states.latest) is not None and latest.tick >= tick:
             return latest
         return await self._states.next(lambda state: state.tick >= tick, STATE_S)
 
@@ -274,5 +272,6 @@ def understood(decode: Callable[[bytes], T], data: bytes) -> T:
     try:
         return decode(data)
     except ProtocolError as error:
-        why = f"the robot's answer is invalid, perhaps because it uses a newer protocol: update the client ({error})"
-        raise UnexpectedReplyError(why) from error
+        raise UnexpectedReplyError(
+            f"the robot's answer is invalid, perhaps because it uses a newer protocol: update the client ({error})"
+        ) from error

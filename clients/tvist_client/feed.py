@@ -73,12 +73,9 @@ class Feed(Generic[M]):
         """Newest message since the subscription; None before the first."""
         self.malformed = 0
         """Number of messages dropped because they do not follow this protocol."""
-        self._transport = transport
+        self._transport, self._kind, self._once_a_tick = transport, kind, once_a_tick
         self._topic: Topic = topic
-        self._kind = kind
-        self._once_a_tick = once_a_tick
-        self._subscribed = False
-        self._finished = False
+        self._subscribed = self._finished = False
         self._listeners: list[Callable[[M], object]] = []
         self._streams: weakref.WeakSet[Stream[M]] = weakref.WeakSet()
         self._waiting: dict[asyncio.Future[M], Callable[[M], bool]] = {}
@@ -103,9 +100,8 @@ class Feed(Generic[M]):
 
     def stream(self, buffer: int) -> Stream[M]:
         """Return an iterator over every message from now on; it is dropped when it is no longer referenced."""
-        size = whole(buffer, "buffer", 1)
+        stream = Stream[M](whole(buffer, "buffer", 1))
         self.subscribe()
-        stream: Stream[M] = Stream(size)
         self._streams.add(stream)
         return stream
 
@@ -118,8 +114,9 @@ class Feed(Generic[M]):
             async with asyncio.timeout(timeout_s):
                 return await message
         except TimeoutError:
-            why = f"no {self._topic} came within {timeout_s:g} s: the robot does not tick, or the connection is broken"
-            raise AnswerTimeoutError(why) from None
+            raise AnswerTimeoutError(
+                f"no {self._topic} came within {timeout_s:g} s: check the robot with tvist check"
+            ) from None
         finally:
             self._waiting.pop(message, None)
 
@@ -145,7 +142,12 @@ class Feed(Generic[M]):
             return
         self.latest = message
         for listener in tuple(self._listeners):
-            self._call(listener, message)
+            try:
+                listener(message)
+            except Exception as error:  # noqa: BLE001  a user's function may raise anything
+                asyncio.get_running_loop().call_exception_handler(
+                    {"message": f"a callback for {self._topic} raised", "exception": error}
+                )
         # Checked first, because iterating over an empty weak set takes longer than decoding a state.
         if self._streams:
             for stream in tuple(self._streams):
@@ -153,12 +155,3 @@ class Feed(Generic[M]):
         for waiting, wanted in tuple(self._waiting.items()):
             if not waiting.done() and wanted(message):
                 waiting.set_result(message)
-
-    def _call(self, listener: Callable[[M], object], message: M) -> None:
-        """Call a listener; log an error in it, so that it affects neither the robot nor the other listeners."""
-        try:
-            listener(message)
-        except Exception as error:  # noqa: BLE001  a user's function may raise anything
-            asyncio.get_running_loop().call_exception_handler(
-                {"message": f"a callback for {self._topic} raised", "exception": error}
-            )

@@ -20,7 +20,7 @@ from tvist_client.transports.certificates import Folder
 from tvist_client.transports.inbox import wake
 from tvist_client.transports.session import ask, close_session, open_session
 from tvist_client.transports.zenoh import natural
-from tvist_protocol import Info, ProtocolError, Refused, Reply, State, Stop, Telemetry, keys
+from tvist_protocol import Info, ProtocolError, Refused, State, Stop, Telemetry, keys
 from tvist_protocol.codec import decode, decode_reply, encode
 
 T = TypeVar("T")
@@ -29,7 +29,8 @@ SETTLE_S = 0.3
 """Time for tokens to arrive after the session has opened [s]; on a slow network, `look` also sees late ones."""
 LISTEN_S = 1.3  # time in which every robot in real time publishes its telemetry at least once [s]
 _TIMING = ("ticks_per_second", "missed_ticks", "late_p99_us", "load", "due_ticks", "overloaded")
-"""Fields of a fleet's robot that are those of its telemetry."""
+_OF_INFO = ("model", "clock", "control")
+"""Fields of a fleet's robot that are those of its telemetry, and of its description."""
 
 
 class RobotPlace(NamedTuple):
@@ -161,7 +162,13 @@ class Fleet(FleetSession):
         """Stop the motions of the robots `places`, all at once and whichever client has control."""
         wanted, data = sorted(places, key=_by_number), encode(Stop())
         replies = await asyncio.gather(*(self._ask(place, "command", data, decode_reply) for place in wanted))
-        return [_stopped(place, reply) for place, reply in zip(wanted, replies, strict=True)]
+        why = [f"refused: {one.why}" if isinstance(one, Refused) else one for one in replies]
+        return [
+            StopReport(
+                *place, ok=not isinstance(said, str), said=said if isinstance(said, str) else "stopped"
+            )
+            for place, said in zip(wanted, why, strict=True)
+        ]
 
     def _on_token(self, place: RobotPlace, sample: zenoh.Sample) -> None:
         there = sample.kind == zenoh.SampleKind.PUT
@@ -181,7 +188,7 @@ class Fleet(FleetSession):
         if reply is None:
             return "it does not answer"
         if reply.ok is None:
-            return f"it does not answer within {ANSWER_S:g} s: it hangs, or needs more time"
+            return f"it does not answer within {ANSWER_S:g} s: try again, or restart its server"
         try:
             return understood(read, reply.ok.payload.to_bytes())
         except UnexpectedReplyError as error:
@@ -189,23 +196,20 @@ class Fleet(FleetSession):
 
     def _row(self, place: RobotPlace, answer: Info | str) -> FleetRobot:
         heard, telemetry = self._told.get(place, (None, None))
-        info, stands = None, Readiness(False, None, None, None, str(answer), "")
+        stands = Readiness(False, None, None, None, str(answer), "")
         if isinstance(answer, Info):
             unlock = unlock_command(ENDPOINT, place.robot, None, place.namespace)
-            info, stands = answer, readiness(answer, None, unlock)
-        timing = {name: getattr(telemetry, name, None) for name in _TIMING}
+            stands = readiness(answer, None, unlock)
         return FleetRobot(
             namespace=place.namespace,
             name=place.robot,
-            model=None if info is None else info.model,
-            clock=None if info is None else info.clock,
             robot_mode=stands.robot_mode,
             safety_mode=stands.safety_mode,
-            control=None if info is None else info.control,
             ready=stands.ready,
             silent_s=None if heard is None else self._loop.time() - heard,
             said=_load(telemetry) if stands.ready else stands.sentence,
-            **timing,
+            **{name: getattr(answer, name, None) for name in _OF_INFO},
+            **{name: getattr(telemetry, name, None) for name in _TIMING},
         )
 
 
@@ -214,12 +218,6 @@ def _load(telemetry: Telemetry | None) -> str:
         return ""
     due = telemetry.due_per_second or 0.0
     return f"overloaded: {telemetry.ticks_per_second:.0f} of {due:g} ticks/s. Next: {RELIEVE}"
-
-
-def _stopped(place: RobotPlace, reply: Reply | str) -> StopReport:
-    if isinstance(reply, str | Refused):
-        return StopReport(*place, ok=False, said=reply if isinstance(reply, str) else f"refused: {reply.why}")
-    return StopReport(*place, ok=True, said="stopped")
 
 
 def _by_number(place: RobotPlace) -> list[list[int | str]]:
@@ -261,7 +259,7 @@ class ManyStates(FleetSession):
 
     def look(self) -> dict[RobotPlace, NewestState]:
         """Return the newest state of each robot that has ever sent one."""
-        found: dict[RobotPlace, NewestState] = {}
+        found = dict[RobotPlace, NewestState]()
         for place, (data, received, at) in sorted(self._newest.items()):
             with suppress(ProtocolError):  # from another version
                 found[place] = NewestState(decode(State, data), received, at)

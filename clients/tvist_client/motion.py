@@ -26,8 +26,7 @@ class Motion:
     """Event that reports its end before the target; None if there is none."""
 
     def __init__(self, id: int, pass_time: Callable[["Motion"], Awaitable[None]]) -> None:  # noqa: A002  the wire's name
-        self.id = id
-        self._pass_time = pass_time
+        self.id, self._pass_time = id, pass_time
         self._error: ClientError | None = None
         self._ended = asyncio.Event()
 
@@ -79,8 +78,7 @@ class MotionsByNumber:
     """The motions of one robot by number, each created by its answer or first event, whichever comes first."""
 
     def __init__(self, pass_time: Callable[[Motion], Awaitable[None]]) -> None:
-        self._pass_time = pass_time
-        self._motions: dict[int, Motion] = {}
+        self._pass_time, self._motions = pass_time, dict[int, Motion]()
 
     def motion(self, id: int) -> Motion:  # noqa: A002  the wire's name
         """Return the motion with this number; create it if neither an answer nor an event has named it yet."""

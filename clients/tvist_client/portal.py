@@ -7,6 +7,7 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import AbstractAsyncContextManager
+from functools import partial
 from typing import Any, TypeVar
 
 from tvist_client.errors import MisuseError, NotConnectedError
@@ -59,8 +60,7 @@ class Portal:
             if sys.is_finalizing():
                 # The interpreter discards a block that was never left; the loop's thread has already ended.
                 raise
-            kind, raised, trace = type(error), error, error.__traceback__
-            if not self.call(lambda: context.__aexit__(kind, raised, trace)):
+            if not self.call(partial(context.__aexit__, type(error), error, error.__traceback__)):
                 raise
         else:
             self.call(lambda: context.__aexit__(None, None, None))

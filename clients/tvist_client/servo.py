@@ -7,8 +7,8 @@ from typing import Self
 from tvist_client.command import TICK
 from tvist_client.connection import MAX_STEP, Connection, step
 from tvist_client.errors import MisuseError, StreamStoppedError
-from tvist_client.values import JointRange
-from tvist_protocol import Event, Setpoint, StepSetpoint
+from tvist_client.values import joint_angles
+from tvist_protocol import Event, Info, Setpoint, StepSetpoint
 from tvist_protocol.codec import encode
 
 
@@ -20,11 +20,10 @@ class Servo:
     sequence: int
     """Number of the next set-point."""
 
-    def __init__(self, robot: Connection, token: str, period: float, joints: JointRange) -> None:
+    def __init__(self, robot: Connection, token: str, period: float, info: Info) -> None:
         self.period = period
         self.sequence = 0
-        self._robot, self._token = robot, token
-        self._joints = joints
+        self._robot, self._token, self._info = robot, token, info
         self._left = False
         self._stopped: Event | None = None
 
@@ -55,11 +54,10 @@ class Servo:
             MisuseError: The block of `Arm.servo` has been left.
         """
         self.check()
-        sequence = self.sequence
-        setpoint = Setpoint(token=self._token, sequence=sequence, q=self._joints.check(q))
+        setpoint = Setpoint(token=self._token, sequence=self.sequence, q=joint_angles(q, self._info))
         self._robot.put_setpoint(encode(setpoint))
         self.sequence += 1
-        return sequence
+        return setpoint.sequence
 
     async def step_through(self, qs: Iterable[Iterable[float]]) -> int:
         """Play set-points in lockstep and free, each for one period, and step time accordingly.
@@ -78,7 +76,7 @@ class Servo:
         if await self._robot.clock() == "realtime":
             raise MisuseError("this robot runs in real time: call set(q) once per period")
         setpoints = [
-            StepSetpoint(sequence=self.sequence + place, q=self._joints.check(q, f"qs[{place}]"))
+            StepSetpoint(sequence=self.sequence + place, q=joint_angles(q, self._info, f"qs[{place}]"))
             for place, q in enumerate(qs)
         ]
         if not setpoints:

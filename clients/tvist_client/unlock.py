@@ -62,8 +62,7 @@ async def unlock(robot: Robot, endpoint: str, command: str, *, power_on: bool = 
 
 async def make_ready(robot: Robot, arm: Arm, *, power_on: bool = False) -> list[str]:
     """Restart the safety system, unlock a protective stop and power on the arm if needed; return what was done."""
-    done: list[str] = []
-    found = await look(robot)
+    done, found = list[str](), await look(robot)
     if found.safety_mode in _WHAT_IT_FOUND:
         await arm.restart_safety()
         done.append(f"restarted the safety system, which {_WHAT_IT_FOUND[found.safety_mode]}")

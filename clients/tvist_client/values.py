@@ -39,32 +39,23 @@ def whole(value: int, where: str, low: int, high: int | None = None) -> int:
     return found
 
 
-class JointRange:
-    """The joint angles that a robot accepts; set-points are checked here because the robot does not answer them."""
-
-    def __init__(self, info: Info) -> None:
-        self._joints = info.joints
-        self._ranges = info.limits.position
-
-    def check(self, q: Iterable[float], where: str = "q") -> tuple[float, ...]:
-        """Convert joint angles to floats, and check that the robot accepts them."""
-        entries = None
-        if not isinstance(q, str | bytes):
-            with contextlib.suppress(TypeError):
-                entries = tuple(q)
-        if entries is None:
-            raise ArgumentError(where, f"{where} is {quoted(q)}: must be a list of numbers")
-        angles = tuple(number(angle, f"{where}[{place}]") for place, angle in enumerate(entries))
-        joints, ranges = self._joints, self._ranges
-        if len(angles) != len(joints):
-            why = f"{where} has {len(angles)} angles; this arm has {len(joints)} joints: give one per joint"
-            raise ArgumentError(where, why, len(joints))
-        for place, (angle, (low, high)) in enumerate(zip(angles, ranges, strict=True)):
-            if low <= angle <= high:
-                continue
-            field = f"{where}[{place}]"
-            if not math.isfinite(angle):
-                raise ArgumentError(field, f"{field} is {angle}: must be a finite number of rad")
-            why = f"{field} is {angle:g} rad; joint {joints[place]} allows {low:g} to {high:g} rad"
+def joint_angles(q: Iterable[float], info: Info, where: str = "q") -> tuple[float, ...]:
+    """Convert joint angles to floats, and check them here, since a robot does not answer set-points."""
+    entries = None
+    if not isinstance(q, str | bytes):
+        with contextlib.suppress(TypeError):
+            entries = tuple(q)
+    if entries is None:
+        raise ArgumentError(where, f"{where} is {quoted(q)}: must be a list of numbers")
+    angles = tuple(number(angle, f"{where}[{place}]") for place, angle in enumerate(entries))
+    if len(angles) != (joints := len(info.joints)):
+        why = f"{where} has {len(angles)} angles; this arm has {joints} joints: give one per joint"
+        raise ArgumentError(where, why, joints)
+    for place, (angle, (low, high)) in enumerate(zip(angles, info.limits.position, strict=True)):
+        field = f"{where}[{place}]"
+        if not math.isfinite(angle):
+            raise ArgumentError(field, f"{field} is {angle}: must be a finite number of rad")
+        if not low <= angle <= high:
+            why = f"{field} is {angle:g} rad: joint {info.joints[place]} allows {low:g} to {high:g} rad"
             raise ArgumentError(field, why, low if angle < low else high)
-        return angles
+    return angles

@@ -224,7 +224,7 @@ def _written(name, *contents):
 def _run_commands(path):
     """What a user does with a log: each command ends well or refuses in one line, whatever the others do."""
     from tvist_cli.commands.log import analyze, export, replay
-    from tvist_cli.failure import Failure
+    from tvist_cli.failure import Failure, failing_on
 
     to = {"to": "csv", "output": path.with_name("written.csv")}
     commands = {analyze.analyze: {"json": True}, export.export: to, replay.replay: {}}
@@ -233,7 +233,8 @@ def _run_commands(path):
         _limit_time()
         with redirect_stdout(io.StringIO()), suppress(SystemExit):
             try:
-                command(path, **options)
+                with failing_on(OSError):
+                    command(path, **options)
             except Failure as failure:
                 refused.append(str(failure))
     assert all(said.isprintable() and len(said) < 1000 for said in refused), refused

@@ -14,6 +14,7 @@ from tests.conformance.wire import Wire
 from tvist_cli import main
 
 from .bystander import Bystander
+from .shell import Ended
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -54,15 +55,14 @@ def start():
 
 @pytest.fixture
 def called(monkeypatch, capfd, tmp_path):
-    """Return a function that runs `tvist` in this process; it returns exit code, stdout and stderr."""
+    """Return a function that runs `tvist` in this process; it returns an `Ended`."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(signal, "signal", lambda *_: None)  # this process keeps its handlers
 
     def run(*arguments):
-        monkeypatch.setattr(sys, "argv", ["tvist", *arguments])
+        monkeypatch.setattr(sys, "argv", ["tvist", *map(str, arguments)])
         with pytest.raises(SystemExit) as ended:
             main.main()
-        out, err = capfd.readouterr()
-        return ended.value.code, out, err
+        return Ended(ended.value.code, *capfd.readouterr())
 
     return run

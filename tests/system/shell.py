@@ -3,16 +3,18 @@
 import json
 import subprocess
 import sys
+from typing import NamedTuple
 
 from tests import forked
 from tests.conformance.served import NOISE, finished
 
 
-class Ended:
+class Ended(NamedTuple):
     """A program that has ended, with exit code and output."""
 
-    def __init__(self, code, out, err):
-        self.code, self.out, self.err = code, out, err
+    code: int
+    out: str
+    err: str
 
     @property
     def json(self):

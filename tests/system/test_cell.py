@@ -1,10 +1,12 @@
-"""A cell with a gripper: boxes are picked and placed by URScript and by ur_rtde, and recordings replay equally."""
+"""A cell with a gripper: boxes are picked and placed by URScript and by ur_rtde, whose recording replays equally."""
 
 from pathlib import Path
 
 import pytest
 from tests.conformance.served import Served, finished
 from tests.places import own_address
+
+from tvist_lab.recordings.mcap_file import read
 
 from .test_ur_lockstep import replayed
 
@@ -20,14 +22,13 @@ def told(content):
     return picked, len(put), [event.why for event in content.events if event.code == "payload_mismatch"]
 
 
-def test_program_moves_a_box_with_its_payload_declared(tmp_path):
+def test_program_moves_a_box_with_its_payload_declared(called, tmp_path):
     """All boxes take the robot 40 s."""
     path, program = tmp_path / "run.mcap", tmp_path / "one_box.script"
     program.write_text(PROGRAM.read_text().replace("n < 4", "n < 1"))
-    ended = finished("-m", "tvist_cli", "run", program, "--cell", CELL, "--lockstep", "--record", path)
-    assert ended.returncode == 0, ended.stderr
-    assert told(replayed(path)) == (BOXES[:1], 1, [])
-    assert "made 6 moves; after a stop the tool shook with at most" in ended.stderr
+    ended = called("run", program, "--cell", CELL, "--lockstep", "--record", path).assert_done()
+    assert told(read(path)) == (BOXES[:1], 1, [])
+    assert "made 6 moves; after a stop the tool shook with at most" in ended.err
 
 
 @pytest.mark.realtime

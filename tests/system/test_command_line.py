@@ -4,118 +4,48 @@ That each command does what its example says is docs/test_tutorials.py.
 """
 
 import json
-import math
 import re
 import signal
 from pathlib import Path
 
 import pytest
 from tests.conformance.served import PATIENCE, Served, free_endpoint
-from tests.conformance.wire import STOPPED, Wire
-from tests.system.shell import begun, python, tvist
+from tests.conformance.wire import Wire
+from tests.system.shell import begun, tvist
 
 from tvist_cli.output import out, table
-from tvist_client.blocking import Robot
 
 HERE = Path(__file__).parent
 EXAMPLES = HERE.parents[1] / "clients" / "examples"
-NEAR = "0.1,-3.1,0.1,-1.5,0.1,0.1"
-BENT = "0,-1.57,1.57,-1.57,-1.57,0"
 
 
-def test_check_names_missing_and_present_robots(lockstep):
+def test_check_names_missing_and_present_robots(lockstep, called, monkeypatch):
+    monkeypatch.setattr("tvist_client.transports.zenoh.FIND_S", 0.1)
     endpoint = free_endpoint()
-    assert tvist("check", endpoint, "--json").assert_failed(1, endpoint).json["ok"] is False
-    tvist("check", lockstep.endpoint, "--name", "other").assert_failed(1, "'other'", "ur5e")
-    assert tvist("check", lockstep.endpoint, "--json").assert_done().json["state_rate_hz"] is None
+    assert called("check", endpoint, "--json").assert_failed(1, endpoint).json["ok"] is False
+    called("check", lockstep.endpoint, "--name", "other").assert_failed(1, "'other'", "ur5e")
+    assert called("check", lockstep.endpoint, "--json").assert_done().json["state_rate_hz"] is None
 
 
-def test_commands_report_why_a_robot_has_stopped_and_the_remedy():
+def test_commands_report_why_a_robot_has_stopped_and_the_remedy(called):
     with Served("--payload", "20", "--overload", "--clock", "lockstep") as served:
         with Wire(served.endpoint) as wire, wire.control() as token:
             wire.step(token, 10)
         served.wait_until_said("ur5e: protective stop at tick 6: torque of joint")
         served.wait_until_said(f"tvist unlock {served.endpoint}")
         stop = ("not ready", "PROTECTIVE_STOP since tick", "torque of joint", "tvist unlock")
-        said = tvist("check", served.endpoint, "--json").assert_failed(1, *stop).json
+        said = called("check", served.endpoint, "--json").assert_failed(1, *stop).json
         assert (said["ok"], said["ready"], said["stop"]["code"]) == (False, False, "limit_torque")
-        tvist("move", "Q2", "--endpoint", served.endpoint).assert_failed(1, "not ready", "tvist unlock")
-        ended = tvist("unlock", served.endpoint).assert_failed(1, "not ready", "torque of joint")
+        called("move", "Q2", "--endpoint", served.endpoint).assert_failed(1, "not ready", "tvist unlock")
+        ended = called("unlock", served.endpoint).assert_failed(1, "not ready", "torque of joint")
         assert ended.out.splitlines() == ["unlocked the protective stop", "the robot stopped again at once"]
         assert int(re.search(r"since tick (\d+)", ended.err).group(1)) > 6
 
 
-def test_a_name_is_required_if_there_are_several_robots():
+def test_a_name_is_required_if_there_are_several_robots(called):
     with Served("--robots", "ur5e*2", "--clock", "lockstep", name=None) as served:
-        tvist("unlock", served.endpoint).assert_failed(1, "ur5e-1, ur5e-2", "--name")
-        assert "ur5e-2" in tvist("unlock", served.endpoint, "--name", "ur5e-2").assert_done().out
-
-
-def test_move_accepts_radians_degrees_and_pose_names(lockstep):
-    at = ("--endpoint", lockstep.endpoint)
-    said = tvist("move", "-0.1,-3.0,0,-1.5,0,0", *at, "--json").assert_done().json
-    assert said["seconds"] == pytest.approx((said["done_tick"] - said["started_tick"]) * 0.002)
-    tvist("move", "-6,-178,6,-86,6,6", "--degrees", *at).assert_done()
-    assert "moved to" in tvist("move", "q1", "--shaper", "ZV", *at).assert_done().out
-
-
-def test_move_line_goes_to_a_position_and_by_a_distance(lockstep):
-    at = ("--endpoint", lockstep.endpoint)
-    tvist("move", BENT, *at).assert_done()
-    moved = tvist("move", "--line", "--by", "0,0,-0.05", *at).assert_done().out
-    assert "moved the tool by 0,0,-0.05 in" in moved
-    with Robot.connect(lockstep.endpoint) as robot:
-        wanted = (-0.45, -0.1, 0.45, 2.2, 2.2, 0.1)
-        target = ",".join(map(str, (*wanted[:3], *map(math.degrees, wanted[3:]))))
-        line = ("--line", target, "--degrees", "--duration", 1.5, "--json")
-        said = tvist("move", *line, *at).assert_done().json
-        assert robot.forward_kinematics() == pytest.approx(wanted, abs=1e-9)
-        assert said["seconds"] == pytest.approx(1.5, abs=0.15)  # and the delay of the shaper
-        tvist("move", "--line", "-0.45,-0.1,0.5", *at).assert_done()
-        assert robot.forward_kinematics() == pytest.approx((-0.45, -0.1, 0.5, *wanted[3:]), abs=1e-9)
-
-
-def test_a_refused_move_prints_the_reason_of_the_robot(lockstep):
-    at = ("--endpoint", lockstep.endpoint)
-    tvist("move", "Q1", *at).assert_done()
-    for target, code, words in (
-        (("--line", "0.5,0,0.5"), 1, ("singular", "Next: move the joints", BENT)),
-        (("--line", "2,0,0.5"), 1, ("no_solution",)),
-        (("there",), 2, ("target is 'there'", "Q1, Q2, Q3")),
-        (("9,0,0,0,0,0",), 1, ("limit_position", "q[0]")),
-    ):
-        assert tvist("move", *target, *at).assert_failed(code, *words).out == ""
-    with Wire(lockstep.endpoint) as wire, wire.control("somebody"):
-        tvist("move", NEAR, *at).assert_failed(1, "somebody")
-
-
-@pytest.mark.realtime
-def test_control_c_stops_the_motion(realtime):
-    with Wire(realtime.endpoint) as wire:
-        wire.listen("state")
-        process = begun("move", "3.0,-3.1,0.1,-1.5,0.1,0.1", "--endpoint", realtime.endpoint, "--json")
-        wire.wait("state", lambda state: state["target_q"][0] > 0.1)
-        process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=PATIENCE)
-        assert (process.returncode, out) == (130, "")
-        assert err == "tvist: interrupted: the motion was stopped; the robot is at rest\n"
-        state = wire.state()
-        assert state["runtime_state"] == STOPPED
-        assert 0.1 < state["target_q"][0] < 2.9
-
-
-@pytest.mark.realtime
-def test_stop_ends_the_motion_of_another_client_which_keeps_control(realtime):
-    at = ("--endpoint", realtime.endpoint)
-    with Wire(realtime.endpoint) as wire, wire.control("somebody") as token:
-        wire.listen("state")
-        move = {"q": [3.0, -3.0, 0.0, -1.5, 0.0, 0.0], "velocity": 0.2}
-        motion = wire.command("move_j", token=token, **move)["id"]
-        wire.wait("state", lambda state: state["target_qd"][0] > 0.1)
-        said = tvist("stop", "ur5e", *at, "--json").assert_done().json
-        assert (said["stopped"], said["control"]) == ([f"motion {motion}"], "somebody")
-        assert said["runtime_state"] == "STOPPED"
-        assert tvist("stop", *at).assert_done().out == "ur5e: nothing was under way\n"
+        called("unlock", served.endpoint).assert_failed(1, "ur5e-1, ur5e-2", "--name")
+        assert "ur5e-2" in called("unlock", served.endpoint, "--name", "ur5e-2").assert_done().out
 
 
 @pytest.mark.realtime
@@ -130,7 +60,7 @@ def test_watch_prints_an_object_per_line_until_control_c(realtime):
 
 
 @pytest.mark.parametrize(("what", "kept"), json.loads((HERE / "kept_keys.json").read_text("utf-8")).items())
-def test_json_output_keeps_its_documented_keys(what, kept):
+def test_json_output_keeps_its_documented_keys(called, what, kept):
     """Those of a published version: docs/reference/what-stays.md."""
     words = what.split()
     command, list_of_it = words[: 1 + (words[0] == "log")], words[1 + (words[0] == "log") :]
@@ -141,7 +71,7 @@ def test_json_output_keeps_its_documented_keys(what, kept):
         "log analyze A B": (journal, journal),
         "run": (EXAMPLES / "wave.script", "--lockstep"),
     }
-    said = tvist(*command, *about.get(what, (journal,)), "--json").assert_done().json
+    said = called(*command, *about.get(what, (journal,)), "--json").assert_done().json
     for key in list_of_it:
         said = said[key][0]
     assert set(kept) <= said.keys()
@@ -174,8 +104,8 @@ def test_the_demo_replays_equal_and_its_recording_gives_the_same_figures(tmp_pat
     assert [track["label"] for track in boot["tracks"]] == ["without", "with zv"]
 
 
-def test_bench_measures_the_computing_time_of_a_tick():
-    said = tvist("bench", "--seconds", 0, "--shaper", "EI", "--json").assert_done().json
+def test_bench_measures_the_computing_time_of_a_tick(called):
+    said = called("bench", "--seconds", 0, "--shaper", "EI", "--json").assert_done().json
     assert (said["seconds"], said["shaper"]) == (0, "ei")
     assert 0.0 < said["plant_us_per_tick"] < said["cycle_us_per_tick"]
     assert said["realtime_factor"] == pytest.approx(2000.0 / said["line_us_per_tick"])
@@ -190,19 +120,6 @@ def test_bench_measures_served_robots_and_their_lateness():
     for what in ("setpoint_to_state_ms", "command_ms"):
         assert 0.0 < said[what]["p50"] <= said[what]["p99"]
     assert said["robots_at_500_hz"] >= 0
-
-
-@pytest.mark.realtime
-def test_the_bare_client_swings_the_arm_and_measures_its_response(realtime, tmp_path):
-    shorter = tmp_path / "bare_client.py"
-    text = (EXAMPLES / "01_bare_client.py").read_text(encoding="utf-8")
-    assert "SECONDS = 0.008, 10.0" in text
-    shorter.write_text(text.replace("SECONDS = 0.008, 10.0", "SECONDS = 0.008, 2.0"), encoding="utf-8")
-    ended = python(shorter, realtime.endpoint).assert_done()
-    assert ended.err == ""
-    for what in ("→ target_q", "largest acceleration"):
-        (line,) = (line for line in ended.out.splitlines() if what in line)
-        assert float(line.split(what)[1].split()[0]) > 0.0
 
 
 def test_a_wide_table_is_split_and_repeats_its_first_column(capsys, monkeypatch):

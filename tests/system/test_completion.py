@@ -27,7 +27,6 @@ CASES = {
 }
 """Typed lines with what completes their last word."""
 ASKED = {
-    "tvist serve --shaper zvd": {"zvd", "zvdd", "zvddd"},
     "tvist move Q": {"Q1", "Q2", "Q3"},
     "tvist study moves --shapers zvd": {"zvd", "zvdd", "zvddd"},
 }
@@ -49,57 +48,70 @@ VALUES = [
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A folder with files, and the script of each shell under the name that the shell expects."""
+    """A folder with files, where `script` writes the script of each shell."""
     folder = tmp_path_factory.mktemp("completed")
     for name in ("wave.script", "own.py", "arm.toml"):
         (folder / name).touch()
-    for shell, file in {"bash": "bash-script", "zsh": "_tvist", "fish": "fish-script"}.items():
-        with (folder / file).open("w", encoding="utf-8") as script, contextlib.redirect_stdout(script):
-            completion(shell)
     shutil.copy(ASKING_ZSH / "capture.zsh", folder)
     return folder
 
 
-def candidates(shell, folder, typed):
-    """What a shell offers for the last word of a line."""
+def script(shell, folder):
+    """Return the script of a shell, under the name that the shell expects."""
+    path = folder / {"bash": "bash-script", "zsh": "_tvist", "fish": "fish-script"}[shell]
+    if not path.exists():
+        with path.open("w", encoding="utf-8") as file, contextlib.redirect_stdout(file):
+            completion(shell)
+    return path
+
+
+ASKING_BASH = """
+source bash-script
+function=$(complete -p tvist | sed 's/.*-F \\([^ ]*\\) .*/\\1/')
+for typed in "$@"; do
+  read -ra COMP_WORDS <<< "$typed"
+  COMP_CWORD=$((${#COMP_WORDS[@]} - 1))
+  "$function"
+  printf '%s\\n' "$typed" "${COMPREPLY[@]}" ""
+done
+"""
+"""Prints a paragraph for each of its lines: the line, and what bash offers for its last word."""
+
+
+def shown(shell, folder, *words):
+    """Return what a shell prints."""
     if shutil.which(shell) is None:
         pytest.skip(f"there is no {shell}")
-    match shell:
-        case "bash":
-            asks = (
-                'source bash-script; COMP_WORDS=("$@"); COMP_CWORD=$(($# - 1)); '
-                "function=$(complete -p tvist | sed 's/.*-F \\([^ ]*\\) .*/\\1/'); "
-                '"$function"; printf "%s\\n" "${COMPREPLY[@]}"'
-            )
-            words = ["bash", "-c", asks, "-", *typed.split(" ")]
-        case "fish":
-            words = ["fish", "--no-config", "-c", 'source fish-script; complete -C "$argv"', typed]
-        case "zsh":
-            words = ["zsh", "-f", ASKING_ZSH / "ask.zsh", typed]
+    script(shell, folder)
     ended = subprocess.run(
-        words, capture_output=True, text=True, check=True, cwd=folder, timeout=300, env=PATHS
+        [shell, *words], capture_output=True, text=True, check=True, cwd=folder, timeout=300, env=PATHS
     )
-    return {line.partition("\t")[0] for line in ended.stdout.splitlines() if line}
+    return ended.stdout
 
 
-@pytest.mark.parametrize("typed", CASES)
-def test_bash_completes_the_last_word(typed, folder):
-    assert candidates("bash", folder, typed) == CASES[typed]
+def offered_by_bash(folder, cases):
+    paragraphs = shown("bash", folder, "-c", ASKING_BASH, "-", *cases).split("\n\n")
+    return {typed: set(found) for typed, *found in map(str.splitlines, filter(None, paragraphs))}
 
 
-@pytest.mark.parametrize("typed", ASKED)
-def test_bash_completes_values(typed, folder):
-    assert candidates("bash", folder, typed) == ASKED[typed]
+def test_bash_completes_the_last_word(folder):
+    assert offered_by_bash(folder, CASES) == CASES
+
+
+def test_bash_completes_values(folder):
+    assert offered_by_bash(folder, ASKED) == ASKED
 
 
 @pytest.mark.parametrize("typed", OF_EACH_KIND)
 def test_zsh_completes_the_last_word(typed, folder):
-    assert candidates("zsh", folder, typed) == CASES[typed]
+    assert set(shown("zsh", folder, "-f", ASKING_ZSH / "ask.zsh", typed).splitlines()) == CASES[typed]
 
 
 @pytest.mark.parametrize("typed", OF_EACH_KIND)
 def test_fish_completes_the_last_word(typed, folder):
-    assert candidates("fish", folder, typed) == CASES[typed]
+    asks = 'source fish-script; complete -C "$argv"'
+    lines = shown("fish", folder, "--no-config", "-c", asks, typed).splitlines()
+    assert {line.partition("\t")[0] for line in lines} == CASES[typed]
 
 
 @pytest.mark.parametrize(("annotation", "typed", "wanted"), VALUES)
@@ -111,7 +123,7 @@ def test_completion_offers_the_valid_values_of_each_kind_of_option(
     assert {name for name in names if name.startswith(typed)} == wanted
 
 
-@pytest.mark.parametrize("file", ["bash-script", "_tvist", "fish-script"])
-def test_the_completion_script_contains_every_command(folder, file):
-    text = (folder / file).read_text(encoding="utf-8")
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_the_completion_script_contains_every_command(folder, shell):
+    text = script(shell, folder).read_text(encoding="utf-8")
     assert [name for name in (*COMMANDS, *LOG) if name not in text] == []

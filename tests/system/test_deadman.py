@@ -66,7 +66,7 @@ def stream_and_end(endpoint, bystander, how, options, setpoints):
     assert bystander.command("simulation.reset", token=token, q=Q1, mode="RUNNING")["type"] == "done"
     assert bystander.command("release_control", token=token) == {"type": "done"}
     began = bystander.until_later(5)["tick"]
-    command = [sys.executable, CLIENT, endpoint, "stream", "lease_s=1", *options, *STREAM]
+    command = [sys.executable, CLIENT, endpoint, "stream", "lease_s=0.5", *options, *STREAM]
     client = forked.Popen(command, stdout=subprocess.PIPE)
     try:
         assert client.stdout.readline() == b"under way\n"

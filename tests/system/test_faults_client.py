@@ -1,6 +1,6 @@
 """Clients that die, are suspended or do not read: the arm stops if it must, and others are not disturbed.
 
-Clients that are killed in a motion: test_lease.py.
+Clients that are killed in a motion: test_who_is_who.py.
 """
 
 import signal

@@ -1,16 +1,20 @@
-"""`tvist serve --record FILE --keep DURATION`, ended by signals."""
+"""Recordings of servers that are killed or fail."""
 
 import signal
 from contextlib import suppress
 
-from tests.conformance.served import Served
+import pytest
+from tests.conformance.served import Served, finished, free_endpoint
+from tests.conformance.wire import Wire
 from tests.system.waiting import eventually
 
 from tvist_client.robot import Robot
 from tvist_lab.recordings.mcap_file import RecordingFileError, read
+from tvist_lab.replay import replay_file
 from tvist_protocol.recorded import segment_name
 
 TICKS = 700
+FAR = [1.5, -3.0, 0.2, -1.5, 0.1, 0.3]
 FIRST = 126  # first kept tick, since one segment of 125 ticks has been deleted
 
 
@@ -36,3 +40,47 @@ async def test_killed_and_restarted_service_loses_no_recording(tmp_path):
     assert seen == list(range(FIRST, seen[-1] + 1))
     assert FIRST + 500 <= seen[-1] + 1 <= TICKS + 1
     assert [state.tick for state in ended.states] == list(range(1, 201))
+
+
+@pytest.mark.realtime
+def test_killed_server_leaves_a_recording_that_can_be_read_and_replayed(tmp_path):
+    path = tmp_path / "run.mcap"
+    with Served("--record", str(path)) as served:
+        with Wire(served.endpoint) as wire:
+            token = wire.command("take_control", client="mover")["token"]
+            wire.command("move_j", token=token, q=FAR)
+            began = wire.state()["tick"]
+            wire.until(began + 250)
+        served.process.kill()
+        served.wait()
+    content = read(path)
+    assert not content.complete
+    assert "was not closed" in content.note
+    assert content.states[-1].tick > began  # a chunk holds some 70 states
+    assert replay_file(content).first_difference is None
+
+
+@pytest.mark.realtime
+def test_failing_controller_ends_the_server_with_exit_code_1_and_a_recording(tmp_path):
+    """A server that answers but no longer ticks would be worse than none."""
+    path = tmp_path / "run.mcap"
+    program = """
+import sys
+from tvist_cli.main import main
+from tvist_controller.controller import Controller
+tick = Controller.complete_tick
+def failing(self):
+    if self.tick_number == 100:
+        raise ArithmeticError("on purpose")
+    return tick(self)
+Controller.complete_tick = failing
+sys.argv = ["tvist", "serve", *sys.argv[1:]]
+main()
+"""
+    ended = finished("-c", program, "--listen", free_endpoint(), "--record", str(path))
+    assert ended.returncode == 1
+    assert "ArithmeticError: on purpose" in ended.stderr
+    assert ended.stderr.splitlines()[-1].startswith("tvist: ")
+    content = read(path)
+    assert content.complete
+    assert content.states[-1].tick == 100

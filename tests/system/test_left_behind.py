@@ -21,7 +21,7 @@ from tvist_lab.recordings.mcap_file import read
 from tvist_server.own_folder import OwnFolder
 from tvist_server.shutdown import ending_signals
 
-SPEC = 'shapers = ["none"]\nmoves = 1000\npayloads = [1]\nrobots = ["one-joint"]\n'
+SPEC = 'shapers = ["none"]\nmoves = 300\npayloads = [1]\nrobots = ["one-joint"]\n'
 """A study that takes much longer than the test."""
 WORKERS = ("--robots", "ur5e*2", "--workers", "2", "--clock", "lockstep")
 KILLED_AT_THE_START = """
@@ -62,7 +62,7 @@ def temporary(tmp_path, monkeypatch):
     ("number", "to"),
     [
         (signal.SIGTERM, os.kill),
-        (signal.SIGKILL, os.kill),
+        pytest.param(signal.SIGKILL, os.kill, marks=pytest.mark.nightly),
         pytest.param(signal.SIGHUP, os.killpg, marks=pytest.mark.nightly),  # a closed terminal does this
     ],
 )

@@ -30,9 +30,9 @@ def folder(tmp_path):
     return tmp_path
 
 
-def test_command_shapers_lists_an_own_shaper(folder):
+def test_command_shapers_lists_an_own_shaper(folder, called):
     places = ("--shaper", "mine.py:mine", "--shaper", "mine.py:MEAN")
-    listed = tvist("shapers", "--json", *places, cwd=folder).assert_done().json["shapers"]
+    listed = called("shapers", "--json", *places).assert_done().json["shapers"]
     zv, mine, mean = (next(one for one in listed if one["name"] == name) for name in ("zv", "mine", "mean"))
     same = {"name", "description"}
     assert {k: v for k, v in mine.items() if k not in same} == {k: v for k, v in zv.items() if k not in same}

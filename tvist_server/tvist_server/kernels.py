@@ -29,6 +29,7 @@ from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_protocol.codec import decode_reply, encode
 from tvist_protocol.commands import Command, MoveJ, ServoStart, ServoStop, SetShaper, Stop, TakeControl
+from tvist_protocol.errors import TvistError
 from tvist_protocol.kinematics import ForwardKinematics
 from tvist_protocol.motions import MoveL
 from tvist_protocol.replies import Accepted, Refused, Reply, ToolPose
@@ -47,7 +48,7 @@ KERNELS = tuple(kernel for kernel in kernels if kernel.name.rpartition(".")[2] n
 """Kernels that a served robot may call."""
 
 
-class KernelsError(RuntimeError):
+class KernelsError(TvistError):
     """A compiling process failed, or could not store its result."""
 
 

@@ -20,6 +20,7 @@ from tvist_controller.controller import Controller
 from tvist_controller.dispatch.planner import Planner
 from tvist_controller.host import Host
 from tvist_controller.setup import Setup
+from tvist_protocol.errors import TvistError
 from tvist_server.assembly import LOCAL, Share, check_together, security_of, shares
 from tvist_server.config import ServeConfig
 from tvist_server.gateways.access import with_robots_behind
@@ -44,7 +45,7 @@ from tvist_server.worker import (
 )
 
 
-class WorkersError(Exception):
+class WorkersError(TvistError):
     """Robots cannot be served, or some have stopped; the message says which and why."""
 
 

@@ -7,7 +7,7 @@ from cyclopts import Parameter
 
 from tvist_cli.connection import LOCAL, Connection
 from tvist_cli.failure import Failure
-from tvist_cli.output import out, print_json, waiting
+from tvist_cli.output import print_lines, waiting
 from tvist_client import check as client
 
 
@@ -43,13 +43,9 @@ def check(
             wait=seconds,
             tell=tell,
         )
-    if json:
-        print_json(report)
-    else:
-        for finding in report.findings:
-            if finding.ok:
-                out.print(f"ok  {finding.what:<8} {finding.said}", soft_wrap=True, markup=False)
-    for finding in report.findings:
-        if not finding.ok:
-            what = "the robot is not ready" if finding.what in {"ready", "load"} else f"{finding.what} failed"
-            raise Failure(finding.said if report.starting else f"{what}: {finding.said}")
+    lines = (f"ok  {one.what:<8} {one.said}" for one in report.findings if one.ok)
+    print_lines(report, lines, json=json)
+    if not report.ok:
+        last = report.findings[-1]
+        what = "the robot is not ready" if last.what in {"ready", "load"} else f"{last.what} failed"
+        raise Failure(last.said if report.starting else f"{what}: {last.said}")

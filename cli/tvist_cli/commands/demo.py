@@ -7,9 +7,9 @@ from cyclopts import Parameter
 
 from tvist_cli.compiling import compile_if_new
 from tvist_cli.failure import Failure, Misuse, check_range, failing_on
-from tvist_cli.figure_files import DEFAULT_FIGURES, FigureOptions, write
+from tvist_cli.figure_files import DEFAULT_FIGURES, FigureOptions
 from tvist_cli.offered import ROBOTS
-from tvist_cli.output import number, out, print_json, program, progress, table, words
+from tvist_cli.output import number, out, program, progress, table, words
 from tvist_cli.pages import MAGNIFY, serve_page
 from tvist_cli.studying import print_result
 
@@ -84,11 +84,9 @@ def demo(
     from tvist_lab.studies.paper.experiment import count, simulate
     from tvist_lab.studies.paper.published import ARMS
     from tvist_lab.studies.paper.report import as_dict
-    from tvist_server.option_values import StartError
 
     names = ARMS if robot is calibration is None else (robot or ARMS[0],)
-    with failing_on(StartError, exit_code=2):
-        setups = [free_setup(robot=name, calibration=calibration, seed=seed) for name in names]
+    setups = [free_setup(robot=name, calibration=calibration, seed=seed) for name in names]
     compile_if_new()
     wanted = [baselines, *(False for _ in names[1:])]
     with (
@@ -103,9 +101,9 @@ def demo(
     if output is not None:
         from tvist_lab.studies.paper.figures import draw
 
-        with failing_on(OSError), look.into(output) as save:
-            write(save, draw(arms[0], all_figures=True))
-    print_result({**first, "others": others}, _print_paper, json=json)
+        look.write(output, lambda: draw(arms[0], all_figures=True))
+    result = {**first, "others": others}
+    print_result(result, lambda: _print_paper(result), json=json)
 
 
 def _in_real_time(
@@ -113,25 +111,20 @@ def _in_real_time(
 ) -> None:
     look.check(folder, option="--output")
     from tvist_lab.metrics import NotMeasurableError
-    from tvist_lab.recordings import RecordingError
     from tvist_lab.studies.paper.experiment import count
     from tvist_lab.studies.paper.served import serve
 
     compile_if_new()
     recording = folder / "demo.mcap"
-    errors = (RuntimeError, NotMeasurableError, RecordingError, OSError)
     with (
         progress(count(1, baselines=False), "motions", f"the recording so far is in {folder}") as bar,
-        failing_on(*errors),
+        failing_on(RuntimeError, NotMeasurableError),
     ):
         result = serve(recording, seed, lambda what: bar(1, what))
         overview = _figures(result, folder, look)
-    if json:
-        print_json(result.report)
-    else:
-        if tables:
-            _print_paper(result.report)
-        _say(result, overview, recording)
+    if tables and not json:
+        _print_paper(result.report)
+    print_result(result.report, lambda: _say(result, overview, recording), json=json)
     if not result.equal:
         raise Failure("the recording differs from its replay or from what the client received")
     if view:
@@ -156,10 +149,9 @@ def _say(result: "ServedExperiment", overview: Path, recording: Path) -> None:
     from tvist_lab.studies.paper.answer import answer, checks, terms
 
     for line in answer(result.report, ANSWERED):
-        out.print(line, markup=False)
-    out.print(f"\n  look at {overview}", soft_wrap=True, markup=False)
-    also = f"  ({recording.parent} also holds the paper's figures and the recording)\n"
-    out.print(also, soft_wrap=True, markup=False)
+        out.print(line)
+    out.print(f"\n  look at {overview}", soft_wrap=True)
+    out.print(f"  ({recording.parent} also holds the paper's figures and the recording)\n", soft_wrap=True)
     words({**terms(result.report, ANSWERED), **checks(result.report, result.difference)})
     name = program()
     commands = {
@@ -171,7 +163,7 @@ def _say(result: "ServedExperiment", overview: Path, recording: Path) -> None:
     width = max(map(len, commands))
     out.print("next:")
     for command, does in commands.items():
-        out.print(f"  {command:{width}}  {does}", soft_wrap=True, markup=False)
+        out.print(f"  {command:{width}}  {does}", soft_wrap=True)
 
 
 def _print_paper(result: dict[str, Any]) -> None:
@@ -194,11 +186,18 @@ def _print_arm(result: dict[str, Any]) -> None:
     from tvist_lab.studies.paper.report import methods, table_2
 
     theirs, robot = published()["configurations"], result["robot"]
+    of_both = ((name, theirs[name], row) for name, row in result["table_1"].items())
     table(
         f"{robot}: Table 1, lowest mode with 5 kg",
         ("pose", "f_d Hz, paper", "identified", "true", "ζ, paper", "identified", "true"),
-        [_mode(name, theirs[name], row) for name, row in result["table_1"].items()],
-    )
+        [
+            (
+                name, number(paper["f_d_hz"], 1), number(row["f_d_hz"], 2), number(row.get("true_f_d_hz"), 2),
+                number(paper["zeta"], 2), number(row["zeta"], 3), number(row.get("true_zeta"), 3),
+            )
+            for name, paper, row in of_both
+        ],
+    )  # fmt: skip
     runs = "one run" if result["runs"] == 1 else f"mean of {result['runs']} runs"
     table(
         f"{robot}: Table 2, {runs} beside the paper's 10",
@@ -211,13 +210,3 @@ def _print_arm(result: dict[str, Any]) -> None:
             ("method", "delay ms", "RV m/s²", "peak m/s²", "less %", "still ms", "q̈/limit"),
             methods(result, motion, "{} ←"),
         )
-
-
-def _mode(name: str, paper: dict[str, Any], row: dict[str, float]) -> tuple[str, ...]:
-    return (
-        name,
-        *(number(value, digits) for value, digits in (
-            (paper["f_d_hz"], 1), (row["f_d_hz"], 2), (row.get("true_f_d_hz"), 2),
-            (paper["zeta"], 2), (row["zeta"], 3), (row.get("true_zeta"), 3),
-        )),
-    )  # fmt: skip

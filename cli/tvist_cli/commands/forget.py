@@ -1,7 +1,7 @@
 """`tvist forget`: discard what a served robot has learnt about its payload."""
 
 from tvist_cli.connection import LOCAL, Connection
-from tvist_cli.output import out, print_json
+from tvist_cli.output import print_lines
 from tvist_client.robot import Robot
 from tvist_protocol.io import Io
 
@@ -25,9 +25,10 @@ def forget(*, at: Connection = LOCAL, json: bool = False) -> None:
 
     robot, before = at.run(run)
     declared, assumed = before.payload.mass, before.assumed_payload
-    if json:
-        print_json({"robot": robot, "declared_kg": declared, "forgot_kg": assumed and assumed.mass})
-    elif assumed is None:
-        out.print(f"{robot} has learnt nothing of its payload: it assumes the declared {declared:g} kg")
-    else:
-        out.print(f"{robot} assumes the declared {declared:g} kg again, not {assumed.mass:g} kg")
+    said = (
+        f"{robot} has learnt nothing of its payload: it assumes the declared {declared:g} kg"
+        if assumed is None
+        else f"{robot} assumes the declared {declared:g} kg again, not {assumed.mass:g} kg"
+    )
+    result = {"robot": robot, "declared_kg": declared, "forgot_kg": assumed and assumed.mass}
+    print_lines(result, [said], json=json)

@@ -102,7 +102,7 @@ def identify(
     if output is None:
         output = default_output(Path("robot.toml")) if twin else Path("calibration.json")
     if not output.absolute().parent.is_dir():  # said before half an hour of jogs
-        raise Misuse(f"output is {output}: its folder does not exist")
+        raise Misuse(f"output is {output}: its folder does not exist, make it first")
     from tvist_cli import identifying
 
     if files:

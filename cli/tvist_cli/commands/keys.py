@@ -15,7 +15,7 @@ from tvist_cli.certificates import (
     write_new,
 )
 from tvist_cli.failure import Failure, Misuse, check_range, failing_on
-from tvist_cli.output import out, print_json
+from tvist_cli.output import print_lines
 from tvist_client.transports import certificates as of_client
 from tvist_protocol.keys import check_robot_name
 from tvist_server.gateways.access import Role
@@ -69,17 +69,15 @@ def keys(
         ring = _KeyRing(folder, days)
         ring.look(robot, hosts, asked)
         ring.make(robot, hosts, asked)
-    if json:
-        print_json({"folder": str(folder), "made": ring.made, "kept": ring.kept, "roles": ring.roles})
-        return
-    for line in (
+    lines = (
         *(f"made  {what}" for what in ring.made),
         *(f"kept  {what}" for what in ring.kept),
         f"robot:  tvist serve --security {folder} --listen tls/ADDRESS:7447",
         *(f"{name}:  tvist check tls/HOST:7447 --security {folder / name}" for name in asked),
         f"anyone with {folder / AUTHORITY_KEY} can create operators; the robot does not need it: store it elsewhere",
-    ):
-        out.print(line, soft_wrap=True, markup=False)
+    )
+    result = {"folder": str(folder), "made": ring.made, "kept": ring.kept, "roles": ring.roles}
+    print_lines(result, lines, json=json)
 
 
 @dataclass

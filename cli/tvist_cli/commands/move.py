@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from typing import Annotated, Any
 
 from tvist_cli.connection import LOCAL, Connection
-from tvist_cli.failure import Failure, Misuse, failing_on, interrupted
+from tvist_cli.failure import Failure, Misuse, interrupted
 from tvist_cli.offered import POSES, SHAPERS
-from tvist_cli.output import out, print_json, program
+from tvist_cli.output import print_lines, program
 from tvist_client.arm import Arm
 from tvist_client.motion import Motion
 from tvist_client.readiness import look
@@ -51,7 +51,10 @@ def move(
         shaper: Select this shaper before the motion.
         json: Print one JSON object.
     """
-    given = _limits(velocity=velocity, acceleration=acceleration, jerk=jerk, duration=duration)
+    limits = {"velocity": velocity, "acceleration": acceleration, "jerk": jerk, "duration": duration}
+    given: dict[str, Any] = {name: value for name, value in limits.items() if value is not None}
+    if "duration" in given and len(given) > 1:
+        raise Misuse(f"--{next(iter(given))} and --duration exclude each other: give one of them")
     numbers = _checked(target, line=line, by=by, degrees=degrees)
     held = False
 
@@ -80,28 +83,16 @@ def move(
                     raise
                 return motion.started or 0, motion.done or 0, motion.limited
 
-    with failing_on():
-        try:
-            started, done, limited = asyncio.run(run())
-        except KeyboardInterrupt:
-            ended = "the motion was stopped; the robot is at rest" if held else "nothing was moved"
-            raise interrupted(ended) from None
+    try:
+        started, done, limited = asyncio.run(run())
+    except KeyboardInterrupt:
+        ended = "the motion was stopped; the robot is at rest" if held else "nothing was moved"
+        raise interrupted(ended) from None
     seconds = (done - started) * 0.002
-    if json:
-        print_json({"started_tick": started, "done_tick": done, "seconds": seconds, "limited": limited})
-    else:
-        moved = f"moved the tool {'by' if by else 'to'}" if line else "moved to"
-        out.print(f"{moved} {target.strip()} in {seconds:.3f} s", markup=False)
-        if limited is not None:
-            out.print(limited, markup=False)
-
-
-def _limits(**given: float | None) -> dict[str, Any]:
-    """Return the limits that the user has set, or the duration instead."""
-    limits = {name: value for name, value in given.items() if value is not None}
-    if "duration" in limits and len(limits) > 1:
-        raise Misuse(f"--{next(iter(limits))} and --duration exclude each other: give one of them")
-    return limits
+    moved = f"moved the tool {'by' if by else 'to'}" if line else "moved to"
+    lines = [f"{moved} {target.strip()} in {seconds:.3f} s", *filter(None, [limited])]
+    result = {"started_tick": started, "done_tick": done, "seconds": seconds, "limited": limited}
+    print_lines(result, lines, json=json)
 
 
 def _checked(target: str, *, line: bool, by: bool, degrees: bool) -> tuple[float, ...]:
@@ -124,8 +115,7 @@ def _pose(text: str, poses: Mapping[str, tuple[float, ...]], *, degrees: bool) -
     if not angles:
         unit = "degrees" if degrees else "rad"
         known = f"one of {', '.join(poses)}, or " if poses else ""
-        why = f"target is {quoted(text)}: must be {known}joint angles in {unit} separated by commas"
-        raise Misuse(why)
+        raise Misuse(f"target is {quoted(text)}: must be {known}joint angles in {unit} separated by commas")
     return tuple(map(math.radians, angles)) if degrees else angles
 
 
@@ -133,8 +123,7 @@ def _tool_numbers(text: str, *, by: bool, degrees: bool) -> tuple[float, ...]:
     """Parse a target of the tool: displacement or position [m], or position [m] and rotation vector [rad]."""
     numbers = _numbers(text)
     if len(numbers) not in ({3} if by else {3, 6}):
-        unit = "degrees" if degrees else "rad"
-        pose = f"a position x,y,z in m, or x,y,z,rx,ry,rz in m and {unit}"
+        pose = f"a position x,y,z in m, or x,y,z,rx,ry,rz in m and {'degrees' if degrees else 'rad'}"
         wanted = "a distance dx,dy,dz in m" if by else pose
         raise Misuse(f"target is {quoted(text)}: must be {wanted}")
     turn = tuple(map(math.radians, numbers[3:])) if degrees else numbers[3:]
@@ -154,13 +143,12 @@ async def _line(
     arm: Arm, numbers: tuple[float, ...], limits: dict[str, Any], *, by: bool, joints: int
 ) -> Motion:
     """Move the tool to a position or by a displacement; with three numbers it keeps its orientation."""
-    goal = numbers
     if len(numbers) == 3:
         x, y, z, *turn = await arm.robot.forward_kinematics()
         at = [x + numbers[0], y + numbers[1], z + numbers[2]] if by else numbers
-        goal = (*at, *turn)
+        numbers = (*at, *turn)
     try:
-        return await arm.move_l(goal, **limits)
+        return await arm.move_l(numbers, **limits)
     except RefusedError as error:
         if error.reply.code != "singular":
             raise

@@ -48,13 +48,12 @@ def robots(
         arms = {name: load(name) for name in robot or shipped()}
     listed = [about(name, description) for name, description in arms.items()]
     for one in listed if measure else ():
-        one["measured"] = _measured(one["name"], arms[one["name"]], one, random, vary, seed)
-    result = {"robots": listed}
-    print_result(result, lambda _: _print(listed, in_full=bool(robot)), json=json)
+        one["measured"] = _measured(one, arms[one["name"]], random, vary, seed)
+    print_result({"robots": listed}, lambda: _print(listed, in_full=bool(robot)), json=json)
 
 
 def _measured(
-    name: str, description: "RobotDescription", known: dict[str, Any], moves: int, vary: float, seed: int
+    known: dict[str, Any], description: "RobotDescription", moves: int, vary: float, seed: int
 ) -> list[dict[str, Any]]:
     """Measure an arm as described, stiffer, and softer; return nothing if it has too few joints for auto."""
     from tvist_controller.sources.calibrations import load
@@ -66,21 +65,15 @@ def _measured(
     calibration = next((one for one in map(load, known["calibrations"]) if one.modal is not None), None)
     factors = [1.0, *([1.0 - 0.01 * vary, 1.0 + 0.01 * vary] if vary else [])]
     found = []
-    with progress(len(factors) * moves, f"moves of {name}") as bar:
+    with progress(len(factors) * moves, f"moves of {known['name']}") as bar:
         for factor in factors:
+            own = calibration if factor == 1.0 else None
             try:
-                own = calibration if factor == 1.0 else None
-                made = measure(
-                    description,
-                    own,
-                    stiffness=factor,
-                    moves=moves,
-                    seed=seed,
-                    progress=lambda done: bar(done, None),
+                found.append(
+                    measure(description, own, stiffness=factor, moves=moves, seed=seed, progress=bar)
                 )
-                found.append(made)
             except IdentificationError as error:
-                say(f"{name} with springs times {factor:g} is left out: {error}")
+                say(f"{known['name']} with springs times {factor:g} is left out: {error}")
     return found
 
 
@@ -89,18 +82,16 @@ def _print(listed: list[dict[str, Any]], *, in_full: bool) -> None:
 
     print_entries("arms", listed, LISTED)
     for one in listed if in_full else ():
-        out.print(one["name"], style="bold", markup=False)
+        out.print(one["name"], style="bold")
         origins = one["origins"].items()
         words({key: f"{kind}: {text}" for kind, keys in origins for key, text in keys.items()})
-        columns = ("torque_n_m", "velocity_rad_s", "gear_stiffness_n_m_rad")
+        columns = ("joints", "torque_n_m", "velocity_rad_s", "gear_stiffness_n_m_rad")
         table(
             "joints",
             ("joint", "torque N m", "velocity rad/s", "gear stiffness N m/rad"),
             [
                 (name, f"{torque:g}", f"{velocity:.3g}", f"{stiffness:g}")
-                for name, torque, velocity, stiffness in zip(
-                    one["joints"], *(one[key] for key in columns), strict=True
-                )
+                for name, torque, velocity, stiffness in zip(*(one[key] for key in columns), strict=True)
             ],
         )
     measured = [{"name": one["name"], **found} for one in listed for found in one.get("measured", ())]

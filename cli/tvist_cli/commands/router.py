@@ -29,22 +29,17 @@ def router(
         insecure: Accept remote connections without TLS; anyone can move the robots, and act as one.
     """
     from tvist_client.transports.session import close_session
-    from tvist_server.gateways.base import GatewayError
     from tvist_server.gateways.router import DEFAULT_ENDPOINT, Rate, robots_of, start_router
-    from tvist_server.option_values import StartError
     from tvist_server.shutdown import Shutdown
 
-    with failing_on(StartError, ValueError, exit_code=2):
+    with failing_on(ValueError, exit_code=2):
         rates = [Rate.read(text) for text in rate or []]
         robots = [place for text in robot or [] for place in robots_of(text)]
-        if robots and not rates:
-            raise Misuse("robot needs --rate HZ, the rate of these robots: give it, or leave --robot out")
-        ending = Shutdown()
-        with failing_on(GatewayError), ending.at_once():
-            endpoints = listen or [DEFAULT_ENDPOINT]
-            session = start_router(
-                endpoints, connect or [], rates, robots, security=security, insecure=insecure
-            )
+    if robots and not rates:
+        raise Misuse("robot needs --rate HZ, the rate of these robots: give it, or leave --robot out")
+    endpoints, ending = listen or [DEFAULT_ENDPOINT], Shutdown()
+    with ending.at_once():
+        session = start_router(endpoints, connect or [], rates, robots, security=security, insecure=insecure)
 
     async def run() -> None:
         ended, loop = asyncio.Event(), asyncio.get_running_loop()

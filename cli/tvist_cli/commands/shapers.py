@@ -12,9 +12,11 @@ from tvist_cli.offered import SHAPERS as OFFERED
 from tvist_cli.output import out, table
 from tvist_cli.sensitivity import print_sensitivity
 from tvist_cli.shapers_of import load_given
-from tvist_cli.studying import Figures, ResultFiles, print_result
+from tvist_cli.studying import print_result
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from tvist_shaping import Impulses
     from tvist_shaping.named import AnyShaper
 
@@ -52,7 +54,6 @@ def shapers(
         json: Print one JSON object.
     """
     look.check(figures, output)
-    places = ResultFiles(output, figures, look)
     if sensitivity is None and (output is not None or errors != ERRORS):
         raise Misuse("--errors and --output are for --sensitivity: give it, or leave them out")
     if sensitivity is not None:
@@ -60,7 +61,7 @@ def shapers(
             raise Misuse("--sensitivity does not depend on the frequency: leave --f-d out")
         if shaper:
             raise Misuse("--sensitivity takes the shapers as its values: leave --shaper out")
-        print_sensitivity(sensitivity, zeta, errors, places, json=json)
+        print_sensitivity(sensitivity, zeta, errors, output, figures, look, json=json)
         return
     from tvist_shaping import BUILT_IN, SHAPERS, Registry, ShapingError
     from tvist_shaping.named import OF_SEVERAL_MODES, USES
@@ -78,11 +79,11 @@ def shapers(
     ]  # fmt: skip
     found = [_about(one, f_d, zeta) for one in listed]
     result = {"f_d_hz": f_d, "zeta": zeta, "shapers": found, "for_calibrated_arms": others}
-    places.write(result, lambda: _figures(listed, f_d, zeta))
-    print_result(result, _print, json=json)
+    look.write(figures, lambda: _figures(listed, f_d, zeta))
+    print_result(result, lambda: _print(result), json=json)
 
 
-def _figures(listed: "list[AnyShaper]", f_d: float, zeta: float) -> Figures:
+def _figures(listed: "list[AnyShaper]", f_d: float, zeta: float) -> "dict[str, Figure]":
     from tvist_lab.figures import catalogue_figure, settling_against_delay_figure
     from tvist_shaping import Shaper
 
@@ -100,22 +101,21 @@ def _print(result: dict[str, Any]) -> None:
         [_row(about) for about in result["shapers"]],
     )
     _list(result["shapers"])
-    out.print("\nfor arms with a modal calibration, whose modes and springs they know:", markup=False)
+    out.print("\nfor arms with a modal calibration, whose modes and springs they know:")
     _list(result["for_calibrated_arms"])
     out.print(
         "\nms: how much later a motion ends; mean ms: delay during motion at constant velocity;\n"
         "band: ratios of true to assumed frequency for which at most that much vibration remains;\n"
-        "ζ ≤: largest damping ratio it supports; peak: largest factor on the reference's acceleration",
-        markup=False,
+        "ζ ≤: largest damping ratio it supports; peak: largest factor on the reference's acceleration"
     )
 
 
 def _list(entries: list[dict[str, Any]]) -> None:
     width = max(len(one["name"]) for one in entries)
     for one in entries:
-        out.print(f"{one['name']:{width}}  {one['description']}", markup=False)
+        out.print(f"{one['name']:{width}}  {one['description']}")
         if use := one.get("use"):
-            out.print(f"{'':{width}}  take it for {use}", markup=False)
+            out.print(f"{'':{width}}  take it for {use}")
 
 
 def _about(shaper: "AnyShaper", f_d: float, zeta: float) -> dict[str, Any]:
@@ -134,10 +134,9 @@ def _about(shaper: "AnyShaper", f_d: float, zeta: float) -> dict[str, Any]:
     try:
         impulses = shaper.impulses(f_d, zeta)
         check_mode(f_d, zeta, said["zeta_max"])
-    except ShapingError as error:
-        return said | {"not_for_this_mode": str(error)}
     except FAILURES as error:
-        return said | {"not_for_this_mode": f"it {words(error)}"}
+        why = str(error) if isinstance(error, ShapingError) else f"it {words(error)}"
+        return said | {"not_for_this_mode": why}
     return said | {
         "amplitudes": impulses.A.tolist(),
         "times_s": impulses.tau.tolist(),

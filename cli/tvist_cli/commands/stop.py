@@ -8,7 +8,7 @@ from cyclopts import Parameter
 
 from tvist_cli.connection import LOCAL, Connection
 from tvist_cli.failure import Failure, Misuse, failing_on, interruptible
-from tvist_cli.output import out, print_json
+from tvist_cli.output import print_lines
 from tvist_client.fleet import Fleet, RobotPlace, StopReport, place_of
 from tvist_client.halt import halt
 
@@ -45,13 +45,10 @@ def stop(
         place = RobotPlace("", "") if called is None else place_of(called)
     one = replace(at, name=place.robot or None, namespace=place.namespace or at.namespace)
     report = one.run(lambda robot: halt(robot, at.endpoint))
-    if json:
-        print_json(report)
-    else:
-        said = f"stopped {' and '.join(report.stopped)}" if report.stopped else "nothing was under way"
-        if report.stopped is None:
-            said = "the stop begins with the next step of its clock"
-        out.print(f"{report.robot}: {said}", soft_wrap=True, markup=False)
+    said = f"stopped {' and '.join(report.stopped)}" if report.stopped else "nothing was under way"
+    if report.stopped is None:
+        said = "the stop begins with the next step of its clock"
+    print_lines(report, [f"{report.robot}: {said}"], json=json)
     if not report.ok:
         raise Failure(f"{report.robot} may still be moving: {report.why}")
 
@@ -61,17 +58,12 @@ def _stop_all(at: Connection, *, json: bool) -> None:
         async with Fleet(at.endpoint, security=at.security, namespace=at.namespace) as fleet:
             return await fleet.stop(list(fleet.places))
 
-    with failing_on(), interruptible("robots that had not answered may still be moving"):
+    with interruptible("robots that had not answered may still be moving"):
         reports = asyncio.run(run())
     if not reports:
-        raise Failure("there are no robots, so none was stopped")
-    if json:
-        print_json({"robots": reports})
-    for report in reports if not json else ():
-        where = f"{report.namespace}/{report.name}" if report.namespace else report.name
-        out.print(f"{where}: {report.said}", soft_wrap=True, markup=False)
-    failed = [report for report in reports if not report.ok]
-    if failed:
-        raise Failure(
-            f"{len(failed)} of {len(reports)} robots may still be moving; the first is {failed[0].name}"
-        )
+        raise Failure("there are no robots, so none was stopped: check endpoint and namespace")
+    said = (f"{RobotPlace(report.namespace, report.name)}: {report.said}" for report in reports)
+    print_lines({"robots": reports}, said, json=json)
+    if failed := [report.name for report in reports if not report.ok]:
+        count = f"{len(failed)} of {len(reports)} robots"
+        raise Failure(f"{count} may still be moving; the first is {failed[0]}")

@@ -2,7 +2,7 @@
 
 from tvist_cli.connection import LOCAL, Connection
 from tvist_cli.failure import Failure
-from tvist_cli.output import out, print_json
+from tvist_cli.output import print_lines
 from tvist_client import unlock as client
 from tvist_client.robot import Robot
 from tvist_client.unlock import UnlockReport
@@ -26,14 +26,9 @@ def unlock(at: Connection = LOCAL, *, power_on: bool = False, json: bool = False
         return await client.unlock(robot, at.endpoint, command, power_on=power_on)
 
     report = at.run(run)
-    if json:
-        print_json(report)
-    else:
-        for sentence in report.done:
-            out.print(sentence, soft_wrap=True, markup=False)
+    already = "" if report.done else "; it was ready before, so nothing was done"
+    ready = [f"{report.robot} is ready to be moved{already}"] if report.ok else []
+    print_lines(report, [*report.done, *ready], json=json)
     if not report.ok:
         next_step = f". Next: {report.next}" if report.next else ""
         raise Failure(f"{report.robot} is not ready: {report.why}{next_step}")
-    if not json:
-        already = "" if report.done else "; it was ready before, so nothing was done"
-        out.print(f"{report.robot} is ready to be moved{already}", soft_wrap=True, markup=False)

@@ -6,7 +6,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from tvist_cli.connection import LOCAL, Connection
-from tvist_cli.failure import Misuse, check_range, failing_on
+from tvist_cli.failure import Misuse, check_range
 from tvist_cli.offered import ROBOTS, SHAPERS
 from tvist_cli.output import err
 from tvist_cli.pages import MAGNIFY, serve_page
@@ -48,7 +48,8 @@ def view(
     check_range("magnify", magnify, 1.0, 300.0)
     if not (compare is not None or at.endpoint.endswith(".mcap") or Path(at.endpoint).exists()):
         if beside or html is not None:
-            raise Misuse("--beside needs a recording" if beside else "--html needs a recording or --compare")
+            needs = "--beside needs a recording" if beside else "--html needs a recording or --compare"
+            raise Misuse(f"{needs}: give one, or leave the option out")
         from tvist_cli.judging import judge
         from tvist_view.live import LivePage
         from tvist_view.shown_robot import RobotPlace
@@ -69,6 +70,5 @@ def view(
         return
     if shows.lasts > LONGEST_S:
         raise Misuse(f"the recording lasts {shows.lasts:.0f} s: --html takes at most {LONGEST_S:.0f} s")
-    with failing_on(OSError):
-        write_whole(html, shows.page(magnify).encode())
+    write_whole(html, shows.page(magnify).encode())
     err.print(f"wrote {html}")

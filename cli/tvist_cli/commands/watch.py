@@ -58,7 +58,7 @@ def watch(
     else:
         frames, what = _robot_frames(one, json=json), "the robot keeps"
     began = time.monotonic()
-    with failing_on(), contextlib.suppress(TimeoutError):
+    with contextlib.suppress(TimeoutError):
         try:
             asyncio.run(asyncio.wait_for(_show(frames, every, json=json), seconds))
         except KeyboardInterrupt:
@@ -75,7 +75,7 @@ def _only_robot(at: Connection) -> Connection | None:
             return None
         return dataclasses.replace(at, name=places[0].robot, namespace=places[0].namespace)
 
-    with failing_on(), interruptible("no robot was watched"):
+    with interruptible("no robot was watched"):
         return asyncio.run(find())
 
 

@@ -42,8 +42,9 @@ def settings(endpoint: str, security: Folder | None) -> dict[str, Any]:
         try:
             (folder / name).read_bytes()
         except OSError as error:
-            why = f"{folder / name}: {error.strerror}; `tvist keys` creates a folder for each client"
-            raise NotConnectedError(why) from error
+            raise NotConnectedError(
+                f"{folder / name}: {error.strerror}: give a folder that `tvist keys` made for a client"
+            ) from error
     return {
         "transport/unicast/open_timeout": OPEN_MS,
         "transport/link/tls/enable_mtls": True,
@@ -68,21 +69,23 @@ def why_refused(endpoint: str, security: Folder | None, whose: str = "robot") ->
         return f"{security} does not contain a certificate and its key ({error.reason or error})"
     except (OSError, ValueError):  # nothing listens or answers there
         return None
-    said = None
-    if not encrypted and security is not None:
-        said = f"the {whose} there has no certificates: give tcp/{address} without security"
-    elif encrypted and security is None:
-        said = f"the {whose} there demands certificates: give tls/{address}, and as security the folder that "
-        said += "`tvist keys` made for this client"
-    elif isinstance(failure, ssl.SSLCertVerificationError):
-        said = f"the {whose}'s certificate is not trusted: {failure.verify_message.rstrip('.')}: take the folder that "
-        said += f"`tvist keys` made beside that {whose}'s, and an address given to it as --host"
-    elif encrypted and failure is not None:
-        why = (
-            str(getattr(failure, "reason", None) or failure).rpartition("ALERT_")[2].replace("_", " ").lower()
+    if encrypted != (security is not None):
+        return (
+            f"the {whose} there demands certificates: give tls/{address}, and as security the folder that "
+            "`tvist keys` made for this client"
+            if encrypted
+            else f"the {whose} there has no certificates: give tcp/{address} without security"
         )
-        said = f"the {whose} rejects this certificate ({why}): make another one with `tvist keys`"
-    return said
+    if isinstance(failure, ssl.SSLCertVerificationError):
+        return (
+            f"the {whose}'s certificate is not trusted: {failure.verify_message.rstrip('.')}: take the folder that "
+            f"`tvist keys` made beside that {whose}'s, and an address given to it as --host"
+        )
+    reason = (
+        str(getattr(failure, "reason", None) or failure).rpartition("ALERT_")[2].replace("_", " ").lower()
+    )
+    rejected = f"the {whose} rejects this certificate ({reason}): make another one with `tvist keys`"
+    return rejected if encrypted and failure is not None else None
 
 
 def _handshake(address: str, security: Folder | None) -> tuple[bool, OSError | None]:

@@ -33,17 +33,20 @@ CONFIG: Mapping[str, Any] = {
 
 def open_session(endpoint: str, security: Folder | None = None, namespace: str = "") -> zenoh.Session:
     """Open a session, whose keys omit the namespace. Blocks while it connects."""
+    invalid = NotConnectedError(
+        f"{quoted(endpoint)} is not an endpoint: it must have the form tcp/<host>:<port>, such as "
+        "tcp/127.0.0.1:7447, with a port from 1 to 65535"
+    )
     if not isinstance(endpoint, str) or not _ENDPOINT.fullmatch(endpoint):
-        raise NotConnectedError(_no_endpoint(endpoint))
-    config = zenoh.Config()
-    shown = settings(endpoint, security)
+        raise invalid
+    config, shown = zenoh.Config(), settings(endpoint, security)
     if namespace:
         shown["namespace"] = check_namespace(namespace)
     try:
         for path, value in {**CONFIG, **shown, "connect/endpoints": [endpoint]}.items():
             config.insert_json5(path, json.dumps(value))
     except zenoh.ZError as error:
-        raise NotConnectedError(_no_endpoint(endpoint)) from error
+        raise invalid from error
     try:
         session = zenoh.open(config)
     except zenoh.ZError as error:
@@ -72,15 +75,10 @@ def ask(
         wake(loop, partial(settle, reply))
 
     # With the default quality of service, states have another queue and cannot delay answers.
-    encoding = None if data is None else ENCODING
     callback = Callback(on_reply, on_reply, indirect=False)
+    encoding = None if data is None else ENCODING
     session.get(key, callback, payload=data, encoding=encoding, timeout=timeout_s)
     return answer
-
-
-def _no_endpoint(endpoint: object) -> str:
-    form = "it must have the form tcp/<host>:<port>, such as tcp/127.0.0.1:7447, with a port from 1 to 65535"
-    return f"{quoted(endpoint)} is not an endpoint: {form}"
 
 
 def close_session(session: zenoh.Session) -> None:

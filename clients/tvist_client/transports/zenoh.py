@@ -97,18 +97,15 @@ class ZenohTransport(Transport):
 
     def put_setpoint(self, data: bytes) -> None:
         """Put a set-point; this takes 20 µs, and the set-point is dropped if the link is congested."""
-        if self._closed:
-            raise self._gone()
+        self._check_open()
         self._setpoints.put(data)
 
     async def info(self) -> bytes:
         return await self._get(keys.key(self._robot, "info"), None, INFO_S)
 
     def subscribe(self, topic: Topic, callback: Callable[[bytes], None]) -> None:
-        if self._closed:
-            raise self._gone()
-        key = keys.key(self._robot, topic)
-        droppable = topic in {"state", "truth"}
+        self._check_open()
+        key, droppable = keys.key(self._robot, topic), topic in {"state", "truth"}
 
         def on_sample(sample: zenoh.Sample) -> None:
             # Other clients may put on a key with a wildcard, which arrives here too.
@@ -124,8 +121,7 @@ class ZenohTransport(Transport):
     @contextmanager
     def presence(self, client: str) -> Iterator[None]:
         """Hold a liveliness token of the client. It reaches the robot before any command sent later."""
-        if self._closed:
-            raise self._gone()
+        self._check_open()
         key = keys.client(self._robot, client, str(self._session.info.zid()))
         token = self._session.liveliness().declare_token(key)
         try:
@@ -144,17 +140,14 @@ class ZenohTransport(Transport):
 
     async def _get(self, key: str, data: bytes | None, timeout_s: float) -> bytes:
         """Query one key and return the first answer."""
-        if self._closed:
-            raise self._gone()
+        self._check_open()
         try:
             answer = ask(self._session, key, data, timeout_s)
         except zenoh.ZError as error:
             raise self._gone() from error
         self._pending.add(answer)
-        try:
-            reply = await answer
-        finally:
-            self._pending.discard(answer)
+        answer.add_done_callback(self._pending.discard)
+        reply = await answer
         robot = f"robot {self._robot!r} at {self._endpoint}"
         if reply is None:
             raise NotConnectedError(f"{robot} does not answer: check that the server is still running")
@@ -162,8 +155,9 @@ class ZenohTransport(Transport):
             return reply.ok.payload.to_bytes()
         why = reply.err.payload.to_bytes() if reply.err is not None else b""
         if why == b"Timeout":
-            late = f"{robot} did not answer within {timeout_s:g} s: it hangs, or needs more time"
-            raise AnswerTimeoutError(late)
+            raise AnswerTimeoutError(
+                f"{robot} did not answer within {timeout_s:g} s: try again, or restart its server"
+            )
         raise UnexpectedReplyError(f"the answer is an error instead of a message: {why!r:.80}")
 
     def _on_alive(self, sample: zenoh.Sample) -> None:
@@ -180,6 +174,10 @@ class ZenohTransport(Transport):
         for callback in tuple(self._lost_callbacks):
             callback(error)
 
+    def _check_open(self) -> None:
+        if self._closed:
+            raise self._gone()
+
     def _gone(self) -> NotConnectedError:
         if self._closed:
             return NotConnectedError("the connection is closed: open another one")
@@ -193,7 +191,7 @@ class ZenohTransport(Transport):
                 answer.set_exception(error)
 
     async def _find(self) -> None:
-        robots: list[str] = []
+        robots = list[str]()
         for seconds in (FIND_S, LATE_S - FIND_S):
             with suppress(TimeoutError):
                 async with asyncio.timeout(seconds):
@@ -231,8 +229,9 @@ async def only_robot(endpoint: str, wanted: str, security: Folder | None = None,
     if wanted in robots or not robots:
         return wanted
     if len(robots) > 1:
-        why = f"there are several robots at {endpoint}, {', '.join(robots)}: choose one with --name"
-        raise NotConnectedError(why)
+        raise NotConnectedError(
+            f"there are several robots at {endpoint}, {', '.join(robots)}: choose one with --name"
+        )
     return robots[0]
 
 
@@ -249,9 +248,8 @@ async def _opened(endpoint: str, security: Folder | None, namespace: str) -> zen
 
 async def _robots(session: zenoh.Session) -> list[str]:
     """Return the names of the reachable robots, in natural order: ur5e-2 before ur5e-10."""
-    loop = asyncio.get_running_loop()
-    names: list[str] = []
-    ended = asyncio.Event()
+    loop, ended = asyncio.get_running_loop(), asyncio.Event()
+    names = list[str]()
 
     def on_reply(reply: zenoh.Reply) -> None:
         if reply.ok is not None and (place := keys.place(str(reply.ok.key_expr))) is not None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tvist_protocol.errors import one_line
+from tvist_protocol.errors import TvistError, one_line
 from tvist_protocol.stream import State
 
 Floats = NDArray[np.float64]
@@ -20,7 +20,7 @@ TRUTH_PREFIX = "truth_"  # prefix for the column names of fields of `truth`
 EPOCH = 1e8  # times beyond this are seconds since 1970, not a robot's uptime [s]
 
 
-class RecordingError(ValueError):
+class RecordingError(TvistError, ValueError):
     """A recording lacks requested data, or its parts do not fit together; the message is one line."""
 
     def __init__(self, why: str) -> None:

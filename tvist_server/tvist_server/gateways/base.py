@@ -8,6 +8,7 @@ from tvist_controller.instruments.report import Report, Topic
 from tvist_protocol.channels import tag
 from tvist_protocol.codec import encode
 from tvist_protocol.commands import Command
+from tvist_protocol.errors import TvistError
 from tvist_protocol.io import Io
 from tvist_protocol.replies import Refused, Reply
 from tvist_protocol.stream import Event, State, Telemetry, Truth
@@ -23,7 +24,7 @@ def topic_of(message: Message) -> Topic:
     return cast("Topic", tag(type(message)))
 
 
-class GatewayError(Exception):
+class GatewayError(TvistError):
     """A gateway cannot open; the message gives the reason and the remedy."""
 
 

@@ -1,9 +1,8 @@
 """`tvist log advise`: find in logs what rings, and recommend a shaper."""
 
-from collections.abc import Sequence
 from pathlib import Path
 
-from tvist_cli.failure import Failure, Misuse, failing_on
+from tvist_cli.failure import Failure, Misuse
 from tvist_cli.log_options import AS_IT_IS, LogOptions
 from tvist_cli.output import out, print_json, progress, say, table, typed, write_report
 
@@ -26,14 +25,13 @@ def advise(*files: Path, output: Path | None = None, logs: LogOptions = AS_IT_IS
     from tvist_lab.advice import advise as advised
     from tvist_lab.advice import as_dict, command, verdict
     from tvist_lab.metrics import MeasuredRecording
-    from tvist_lab.recordings import RecordingError
     from tvist_lab.report.of_advice import MODES, OPTIONS, advice_page, modes_rows, option_rows
 
     measured = []
-    with failing_on(RecordingError), progress(len(files), "logs") as bar:
+    with progress(len(files), "logs") as bar:
         for recording in logs.read(*files):
             measured.append(MeasuredRecording.of(recording))
-            bar(1, None)
+            bar()
     joints = sorted({log.recording.joints for log in measured})
     if len(joints) > 1:
         have = " and ".join(map(str, joints))
@@ -50,13 +48,11 @@ def advise(*files: Path, output: Path | None = None, logs: LogOptions = AS_IT_IS
     if json:
         print_json({"files": [str(file) for file in files], **as_dict(advice, measured)})
         return
-    _print("what rings", MODES, modes_rows(advice))
-    _print("what shapers would leave", OPTIONS, option_rows(advice))
+    for title, heads, rows in (
+        ("what rings", MODES, modes_rows(advice)),
+        ("what shapers would leave", OPTIONS, option_rows(advice)),
+    ):
+        if rows:
+            table(title, [head.replace("\n", " ") for head in heads], rows)
     for sentence in (*verdict(advice, measured), *command(advice, measured)):
         out.print(sentence)
-
-
-def _print(title: str, heads: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    if rows:
-        cells = [[cell.replace("\n", " ") for cell in row] for row in rows]
-        table(title, [head.replace("\n", " ") for head in heads], cells)

@@ -4,10 +4,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tvist_cli.failure import Failure, Misuse, failing_on
+from tvist_cli.failure import Failure, Misuse
 from tvist_cli.figure_files import DEFAULT_FIGURES, FigureOptions, Save, write
 from tvist_cli.log_options import AS_IT_IS, LogOptions
-from tvist_cli.output import number, out, print_json, progress, say, table, words
+from tvist_cli.output import number, out, print_json, print_lines, progress, say, table, words
 
 if TYPE_CHECKING:
     from tvist_lab.metrics import ComparedMotion, MotionRows
@@ -54,11 +54,12 @@ def analyze(
     """
     look.check(figures)
     if len(files) not in (1, 2):
-        why = f"analyze needs one recording or log, or two to compare, not {len(files)}: tvist log analyze run.mcap"
-        raise Misuse(why)
+        raise Misuse(
+            f"analyze needs one recording or log, or two to compare, not {len(files)}: tvist log analyze run.mcap"
+        )
+    if len(files) == 2 and figures is not None:
+        raise Misuse("--figures is for one file: leave it out")
     if len(files) == 2:
-        if figures is not None:
-            raise Misuse("--figures is for one file: leave it out")
         _compare(*files, logs, json=json)
         return
     from tvist_lab.metrics import NotMeasurableError
@@ -69,7 +70,7 @@ def analyze(
     (recording,) = logs.read(file, sensor=True)
     about = summary(file, recording)
     if not json:
-        out.print(about["file"], markup=False)
+        out.print(about["file"])
         words(_facts(about))
     for note in recording.notes:
         say(f"{file}: {note}")
@@ -89,7 +90,7 @@ def analyze(
 def _motions(
     recording: "Recording", figures: Path | None, look: FigureOptions, *, json: bool
 ) -> dict[str, Any]:
-    """Measure all motions; print them as a table, or return the content for --json."""
+    """Measure all motions; return the content for --json, or print it as a table."""
     from tvist_lab.metrics import (
         COLUMNS,
         MeasuredRecording,
@@ -105,23 +106,21 @@ def _motions(
     with progress(len(found), "motions") as bar:
         for motion in found:
             results.append(measure(recording, motion))
-            bar(1, None)
+            bar()
     if figures is not None:
         with look.into(figures) as save:
             _draw(recording, found, save)
     changed = changes(MeasuredRecording(recording, found, results))
-    if json:
-        return {"motions": [result.as_dict() for result in results], "changes": changed}
-    if not results:
+    if not results and not json:
         out.print("It contains no motion.")
-        return {}
-    origin = recording.origin
-    since = f", times from {origin:.3f} s on" if origin else ""
-    rows = [[cell.replace("\n", " ") for cell in row] for row in motion_cells(results, origin)]
-    table(f"{counted(len(results), 'motion')}{since}", tuple(COLUMNS), rows)
-    for note in (*changed, *grouped_notes(results)):
-        out.print(note, markup=False)
-    return {}
+    elif not json:
+        origin = recording.origin
+        since = f", times from {origin:.3f} s on" if origin else ""
+        title = f"{counted(len(results), 'motion')}{since}"
+        table(title, tuple(COLUMNS), motion_cells(results, origin))
+        for note in (*changed, *grouped_notes(results)):
+            out.print(note)
+    return {"motions": [result.as_dict() for result in results], "changes": changed}
 
 
 def _sensor_alone(recording: "Recording", *, json: bool) -> dict[str, Any]:
@@ -130,18 +129,17 @@ def _sensor_alone(recording: "Recording", *, json: bool) -> dict[str, Any]:
     from tvist_lab.metrics.sensor_alone import free_vibrations
 
     found = free_vibrations(recording)
-    if json:
-        return {"motions": [], "free_vibrations": [asdict(one) for one in found]}
     rows = [
-        [text.replace("\n", " ") for text in (
+        (
             one.kind, cell(one.start_s - recording.origin, 3), cell(one.f_d_hz, 2, one.f_d_interval_hz),
             cell(one.zeta, 3, one.zeta_interval),
-        )]
+        )
         for one in found
     ]  # fmt: skip
-    names = ("vibration", "start s", "frequency f_d Hz", "damping ζ")
-    table("an accelerometer alone, no joint angles", names, rows)
-    return {}
+    if not json:
+        names = ("vibration", "start s", "frequency f_d Hz", "damping ζ")
+        table("an accelerometer alone, no joint angles", names, rows)
+    return {"motions": [], "free_vibrations": [asdict(one) for one in found]}
 
 
 def _draw(recording: "Recording", found: "list[MotionRows]", save: Save) -> None:
@@ -149,9 +147,8 @@ def _draw(recording: "Recording", found: "list[MotionRows]", save: Save) -> None
     from tvist_lab.figures import motion_figure, ring_down_figure
     from tvist_lab.metrics import NotMeasurableError
 
-    kinds: dict[str, Any] = {"ring_down": ring_down_figure}
-    if not recording.foreign:
-        kinds = {"motion": motion_figure, **kinds}
+    own: dict[str, Any] = {} if recording.foreign else {"motion": motion_figure}
+    kinds = own | {"ring_down": ring_down_figure}
     for index, motion in enumerate(found, 1):
         for kind, figure_of in kinds.items():
             try:
@@ -161,13 +158,12 @@ def _draw(recording: "Recording", found: "list[MotionRows]", save: Save) -> None
 
 
 def _facts(found: dict[str, Any]) -> dict[str, str]:
-    facts = {}
+    missing, size, facts = found["missing_ticks"], found["bytes"], {}
     if found["robot"] is not None:
         facts["robot"] = found["robot"] + (f", a {found['model']}" if found["model"] else "")
     if found["version"] is not None:
         facts["recorded by"] = f"tvist {found['version']}"
     facts["time"] = f"{found['duration_s']:.3f} s from {found['start_s']:.3f} s on"
-    missing = found["missing_ticks"]
     facts["rows"] = f"{found['rows']}, {missing or 'no'} tick{'' if missing == 1 else 's'} missing"
     if found["complete"] is not None:
         facts["closed"] = "yes" if found["complete"] else "no: cut off or damaged"
@@ -177,7 +173,6 @@ def _facts(found: dict[str, Any]) -> dict[str, str]:
         facts["replay"] = "yes" if found["replayable"] else f"no: it {lack}"
         facts["messages"] = ", ".join(f"{count} {kind}" for kind, count in found["messages"].items())
     facts["events"] = ", ".join(f"{count} {kind}" for kind, count in found["events"].items()) or "none"
-    size = found["bytes"]
     facts["size"] = f"{size / 1e6:.1f} MB" if size >= 1e6 else f"{size / 1e3:.1f} kB"
     facts["columns"] = ", ".join(map(_column, found["columns"]))
     return facts
@@ -192,28 +187,24 @@ def _column(column: dict[str, Any]) -> str:
 def _compare(a: Path, b: Path, logs: LogOptions, *, json: bool) -> None:
     from tvist_lab.metrics import MeasuredRecording
     from tvist_lab.metrics import compare as compared
-    from tvist_lab.recordings import RecordingError
 
     first, second = logs.read(a, b)
-    with failing_on(RecordingError):
-        result = compared(MeasuredRecording.of(first), MeasuredRecording.of(second))
+    result = compared(MeasuredRecording.of(first), MeasuredRecording.of(second))
     for file, recording in ((a, first), (b, second)):
         for note in recording.notes:
             say(f"{file}: {note}")
-    if json:
-        print_json(
-            {"a": str(a), "b": str(b), "motions": [motion.as_dict() for motion in result.motions],
-             "only_in_a": list(result.only_in_a), "only_in_b": list(result.only_in_b),
-             "notes": {"a": list(first.notes), "b": list(second.notes)}}
-        )  # fmt: skip
-        return
-    if result.motions:
+    told = {
+        "a": str(a), "b": str(b), "motions": [motion.as_dict() for motion in result.motions],
+        "only_in_a": list(result.only_in_a), "only_in_b": list(result.only_in_b),
+        "notes": {"a": list(first.notes), "b": list(second.notes)},
+    }  # fmt: skip
+    if result.motions and not json:
         table(f"A = {a}, B = {b}", OF_TWO, [_row(motion) for motion in result.motions])
-    else:
-        out.print("No motion of A starts and ends where one of B does.")
+    lines = [] if result.motions else ["No motion of A starts and ends where one of B does."]
     for name, numbers in (("A", result.only_in_a), ("B", result.only_in_b)):
         if numbers:
-            out.print(f"only in {name}, not compared: motion {', '.join(map(str, numbers))}")
+            lines.append(f"only in {name}, not compared: motion {', '.join(map(str, numbers))}")
+    print_lines(told, lines, json=json)
 
 
 def _row(motion: "ComparedMotion") -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from tvist_cli.failure import Misuse, failing_on
+from tvist_cli.failure import Misuse
 from tvist_cli.log_options import AS_IT_IS, LogOptions
 from tvist_cli.misuse import lower
 from tvist_cli.output import default_output, print_json, say
@@ -23,7 +23,7 @@ def export(
         logs: How to read logs.
         json: Print one JSON object.
     """
-    from tvist_lab.recordings import RecordingError, mcap_file
+    from tvist_lab.recordings import mcap_file
     from tvist_lab.recordings.export import FORMATS, FOXGLOVE, written_by
     from tvist_lab.recordings.export import export as write
     from tvist_lab.recordings.mcap_records import files_of
@@ -34,8 +34,7 @@ def export(
     if kind == FOXGLOVE and logs != AS_IT_IS:
         raise Misuse("--columns and --imu are for logs: --to foxglove needs a recording")
     ending = f".{kind}.mcap" if kind == FOXGLOVE else f".{kind}"
-    with failing_on(RecordingError):
-        files = files_of(file)
+    files = files_of(file)
     named = file if file.exists() else files[0]
     path = output or named.with_name(named.name.removesuffix(".gz")).with_suffix(ending)
     written = written_by(path, kind)
@@ -44,15 +43,14 @@ def export(
             raise Misuse(f"{place} is the file to be exported: choose another one with --output")
         if output is None:
             default_output(place)
-    with failing_on(RecordingError):
-        if kind == FOXGLOVE:
-            from tvist_lab.foxglove.export import export as draw
+    if kind == FOXGLOVE:
+        from tvist_lab.foxglove.export import export as draw
 
-            content = mcap_file.read_checked(file)
-            recording = content.recording.noted(*filter(None, [content.note]), *draw(content, path))
-        else:
-            (recording,) = logs.read(file)
-            write(recording, path, kind)
+        content = mcap_file.read_checked(file)
+        recording = content.recording.noted(*filter(None, [content.note]), *draw(content, path))
+    else:
+        (recording,) = logs.read(file)
+        write(recording, path, kind)
     for note in recording.notes:
         say(f"{file}: {note.removeprefix(f'{file} ')}")
     if json:

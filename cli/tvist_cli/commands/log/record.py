@@ -32,7 +32,6 @@ def record(
     """
     check_range("seconds", seconds, 0.0, above=True)
     from tvist_server.option_values import ticks_of
-    from tvist_server.recording import RecorderError
     from tvist_server.recording.recorder import Recorder
     from tvist_server.shutdown import Shutdown
 
@@ -67,8 +66,7 @@ def record(
             missing = ticks[-1] - ticks[0] + 1 - len(ticks) if ticks else 0
             return recorder.place, len(ticks), missing + recorder.dropped
 
-    with failing_on(RecorderError):
-        place, states, lost = asyncio.run(run())
+    place, states, lost = asyncio.run(run())
     ending.close()
     if json:
         print_json({"file": place and str(place), "states": states, "lost": lost})

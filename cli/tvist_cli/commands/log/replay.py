@@ -7,7 +7,7 @@ from pathlib import Path
 
 from tvist_cli.compiling import compile_if_new
 from tvist_cli.failure import Failure, Misuse, check_range, failing_on
-from tvist_cli.output import out, print_json, say
+from tvist_cli.output import print_json, print_lines, say
 from tvist_cli.shapers_of import load_given
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"  # endpoint on which a recording is published
@@ -48,53 +48,45 @@ def replay(
         insecure: With --publish, accept remote connections without TLS and do not authenticate clients.
         json: Print one JSON object.
     """
-    own_server: dict[str, object] = {
-        "listen": listen, "name": name, "speed": speed, "loop": loop or None, "security": security,
-        "insecure": insecure or None,
+    of_publishing = {
+        "--listen": listen, "--name": name, "--speed": speed, "--loop": loop or None, "--security": security,
+        "--insecure": insecure or None,
     }  # fmt: skip
-    unused: dict[str, object] = {"the output": output, "--shaper": shaper, "--plant": plant}
-    for option, given in (unused if publish else own_server).items():
+    of_computing = {"the output": output, "--shaper": shaper, "--plant": plant}
+    for option, given in (of_computing if publish else of_publishing).items():
         if given is not None:
-            raise Misuse(
-                f"--publish computes nothing: leave out {option}"
-                if publish
-                else f"--{option} needs --publish"
-            )
-    if not publish:
+            why = f"--publish computes nothing: leave out {option}"
+            raise Misuse(why if publish else f"{option} needs --publish: give both or neither")
+    if publish:
+        _publish(
+            file, listen=listen or [DEFAULT_ENDPOINT], name=name, speed=1.0 if speed is None else speed, loop=loop,
+            security=security, insecure=insecure, json=json,
+        )  # fmt: skip
+    else:
         _run_again(file, output, shaper or [], plant, json=json)
-        return
-    _publish(
-        file, listen=listen or [DEFAULT_ENDPOINT], name=name, speed=1.0 if speed is None else speed, loop=loop,
-        security=security, insecure=insecure, json=json,
-    )  # fmt: skip
 
 
 def _run_again(file: Path, output: Path | None, shaper: list[str], plant: str | None, *, json: bool) -> None:
     from tvist_controller.sources.own_files import OwnFileError
     from tvist_controller.sources.own_plants import load_plant
-    from tvist_lab.recordings import RecordingError
     from tvist_lab.recordings.mcap_file import read_checked
-    from tvist_lab.replay import ReplayError, replay_file
-    from tvist_server.recording import RecorderError
+    from tvist_lab.replay import replay_file
 
     own = [load_given(place) for place in shaper]
     with failing_on(OwnFileError, exit_code=2):
         arm = None if plant is None else load_plant(plant)
-    with failing_on(RecordingError, ReplayError, RecorderError, ValueError):
+    with failing_on(ValueError):
         content = read_checked(file)
         compile_if_new()
         again = replay_file(content, output, own, arm)
     for note in again.notes:
         say(note)
-    if json:
-        print_json(
-            {"file": str(file), "ticks": len(again.states), "equal": again.first_difference is None,
-             "first_difference": again.first_difference}
-        )  # fmt: skip
-    elif again.first_difference is None:
-        out.print(f"{file}: {len(again.states)} ticks replayed, every state equal to the last bit")
-    if again.first_difference is not None:
-        raise Failure(f"{file}: the second run differs: {again.first_difference}")
+    ticks, differs = len(again.states), again.first_difference
+    result = {"file": str(file), "ticks": ticks, "equal": differs is None, "first_difference": differs}
+    equal = [f"{file}: {ticks} ticks replayed, every state equal to the last bit"]
+    print_lines(result, equal if differs is None else [], json=json)
+    if differs is not None:
+        raise Failure(f"{file}: the second run differs: {differs}")
 
 
 def _publish(
@@ -110,15 +102,11 @@ def _publish(
 ) -> None:
     """Publish a recording until its end or a signal; raise Failure if it cannot be read or the server cannot listen."""
     check_range("speed", speed, 0.01, 100.0)
-    from tvist_lab.recordings import RecordingError
     from tvist_lab.recordings.mcap_file import read_checked
     from tvist_lab.republish import Playback
-    from tvist_server.gateways.base import GatewayError
-    from tvist_server.option_values import StartError
     from tvist_server.shutdown import Shutdown
 
-    with failing_on(RecordingError):
-        content = read_checked(file)
+    content = read_checked(file)
     if content.note:
         say(content.note)
     ending = Shutdown()
@@ -140,8 +128,7 @@ def _publish(
             await playing
         return playback
 
-    with failing_on(StartError, exit_code=2), failing_on(RecordingError, GatewayError):
-        playback = asyncio.run(run())
+    playback = asyncio.run(run())
     ending.close()
     if json:
         print_json({"file": str(file), "name": playback.name, "states": playback.states})

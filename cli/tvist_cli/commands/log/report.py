@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from tvist_cli.failure import Misuse, failing_on
+from tvist_cli.failure import Misuse
 from tvist_cli.log_options import AS_IT_IS, LogOptions
-from tvist_cli.output import default_output, out, print_json, typed, write_report
+from tvist_cli.output import default_output, print_lines, typed, write_report
 
 
 def report(*files: Path, output: Path | None = None, logs: LogOptions = AS_IT_IS, json: bool = False) -> None:
@@ -23,17 +23,10 @@ def report(*files: Path, output: Path | None = None, logs: LogOptions = AS_IT_IS
     if not files:
         raise Misuse("report needs at least one recording or log: tvist log report run.mcap")
     output = default_output(Path("report.html")) if output is None else output
-    from tvist_lab.recordings import RecordingError
     from tvist_lab.report import recordings_page
 
     recordings = logs.read(*files)
-    with failing_on(RecordingError):
-        page = recordings_page(files, typed(), recordings)
+    page = recordings_page(files, typed(), recordings)
     write_report(output, page)
-    if json:
-        print_json(
-            {"files": [str(file) for file in files], "report": str(output), "verdict": list(page.verdict)}
-        )
-        return
-    for sentence in page.verdict:
-        out.print(sentence)
+    result = {"files": [str(file) for file in files], "report": str(output), "verdict": list(page.verdict)}
+    print_lines(result, page.verdict, json=json)
