@@ -83,7 +83,7 @@ class Driven:
         return plant.play(self.driven.commands)
 
     def recorded(self, response, sensors, seed):
-        """Return a robot's recording of an arm's response, with gains and noise of its torque sensors."""
+        """Return a robot's recording of a response, with gains and noise of its torque sensors."""
         kept, measured = slice(self.first, self.stop + AFTER), response.measured
         noise = 0.5 * np.random.default_rng([seed, 99]).standard_normal(measured.moment.shape)
         moment = (sensors * measured.moment + noise)[kept]

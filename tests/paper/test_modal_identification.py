@@ -39,7 +39,7 @@ FEWER = {
     "forecast.SINGLY": 0,
     "forecast.FOLDS": 2,
 }
-"""Constants of the identification with which it takes fewer choices and fits than usual, and quicker ways."""
+"""Constants of an identification with fewer choices and fits than usual, and quicker ways."""
 
 
 def recorded(ring_downs, seed, payloads=PAYLOADS, description=ROBOT):

@@ -25,7 +25,7 @@ LEAST_REDUCTION = {"Q1-Q2": 83.0, "Q1-Q3": 76.0, "Q3-Q1": 78.0}
 
 @pytest.fixture(scope="module")
 def done():
-    """Each motion with a seed that nothing was tuned with; its frequency, which Table 2 lacks, is not fitted."""
+    """Each motion with a seed that nothing was tuned with; frequencies, which Table 2 lacks, are not fitted."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(experiment, "AFTER", 1.2)
         patch.setattr("tvist_lab.metrics.table.ring_down_of", lambda *_: not_measurable("it is not needed"))
@@ -89,7 +89,7 @@ def test_each_baseline_shaper_brings_the_arm_to_rest_with_its_expected_delay(don
 def test_page_has_the_origin_of_every_result(done):
     mine = as_dict(replace(done, table_1={name: done.table_1[name] | TRUE[name] for name in TRUE}))
     for row in (row for methods in mine["baselines"].values() for row in methods.values()):
-        row["peak_reduction_percent"] = 90.0  # made up, since the true acceleration was not recorded
+        row["peak_reduction_percent"] = 90.0  # made up: the truth was not recorded
     others = [row | {"here": "so much", "origin": "tuned"} for row in mine["origins"]]
     text = page_of("paper", {**mine, "others": [{**mine, "robot": "another", "origins": others}]})
     assert "| figure | paper | UR5e | origin | another | origin |" in text
