@@ -20,7 +20,6 @@ from tvist_controller.sources.own_files import is_file
 from tvist_controller.sources.own_shapers import OwnShaper
 from tvist_lab.studies.presets import PRESETS
 from tvist_lab.studies.sweep import NamedRobot, Spec, SweptRobot, digest, read_spec, study
-from tvist_lab.study.arms import scattered
 from tvist_lab.study.case import LIMITS
 from tvist_lab.study.catalogue import baselines, some
 from tvist_lab.study.foreign import CandidateError, FromFile, load_shaper
@@ -32,7 +31,7 @@ from tvist_lab.study.recipes import Recipe, RecipeError
 from tvist_lab.study.request import Preset, StudyRequest
 from tvist_lab.study.study import Study, StudyError
 from tvist_plant.description import DISTURBANCES, DescriptionError, RobotDescription, load, robots
-from tvist_plant.variants import Variant, hidden_variant, variant
+from tvist_plant.variants import Variant, hidden_variant, scattered, variant
 from tvist_protocol.calibration import Calibration, CalibrationError
 from tvist_shaping import Registry
 from tvist_shaping.errors import ShapingError

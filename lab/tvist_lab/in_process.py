@@ -14,7 +14,7 @@ from tvist_controller.api.robot import LoopbackHost
 from tvist_lab.collect import Collected, collect
 from tvist_plant.plant import PERIOD
 from tvist_protocol.info import Info
-from tvist_server.config import ServeConfig
+from tvist_server.config import ServeConfig, from_mapping
 
 LEAD = 150  # ticks at rest before the first motion
 VELOCITY, ACCELERATION = 1.5, 2.0  # the paper's limits of the motions [rad/s, rad/s²]
@@ -27,8 +27,6 @@ def free_setup(config: ServeConfig | None = None, **changes: object) -> Setup:
     `config` keeps its own truth, but `realtime` becomes `free`; `changes` are fields of `ServeConfig`. Raises
     StartError if a change names no field or has an invalid value.
     """
-    from tvist_server.config import from_mapping
-
     if config is None:
         return from_mapping({"clock": "free", "truth": True, **changes}, "setup").setup()
     checked = from_mapping(changes, "setup")

@@ -98,17 +98,12 @@ class OneJointModes:
     description: RobotDescription
     curve: tuple[Plucked, ...]  # modes over `ANGLES`, with each of `MASSES`
     poses: tuple[Plucked, ...]
-    """OneJointModes at Q1 to Q3 of the robot file, the angles of the paper's figure, with its payload."""
+    """Modes at Q1 to Q3 of the robot file, the angles of the paper's figure, with its payload."""
 
-    @property
-    def worst_f_d(self) -> float:
-        """Largest deviation of the simulated f_d from the formula [%]."""
-        return max(100.0 * abs(one.simulated_f_d / one.f_d - 1.0) for one in self.curve)
-
-    @property
-    def worst_zeta(self) -> float:
-        """Largest deviation of the simulated ζ from the formula [%]."""
-        return max(100.0 * abs(one.simulated_zeta / one.zeta - 1.0) for one in self.curve)
+    def worst(self, name: str) -> float:
+        """Return the largest deviation of the simulated "f_d" or "zeta" from the formula [%]."""
+        pairs = ((getattr(one, f"simulated_{name}"), getattr(one, name)) for one in self.curve)
+        return max(100.0 * abs(float(simulated / formula) - 1.0) for simulated, formula in pairs)
 
 
 def pluck_all() -> OneJointModes:

@@ -94,7 +94,9 @@ def replay_file(
             "publish its messages with --publish"
         )
     if (content.dropped or {}).get("journal"):
-        raise ReplayError("the recorder dropped messages of the journal, so the run cannot be repeated")
+        raise ReplayError(
+            "the recorder dropped messages of the journal, so the run cannot be repeated: record it again"
+        )
     last, there = int(content.recording["tick"][-1]), len(content.recording)
     if last > (most := ALWAYS + PER_STATE * there):
         raise ReplayError(f"the recording ends at tick {last}: must be at most {most} with {there} states")

@@ -149,7 +149,7 @@ class TestRecipes:
 
 @pytest.fixture
 def report(ur5e, paper):
-    """What is said of moves by the peaks that they leave unshaped and shaped."""
+    """Make the report of moves with these unshaped and shaped peaks."""
     drawn = draw_moves(ur5e, 1, 0, (0.0, 5.0)).moves
     made = study(StudyRequest(description=ur5e, moves=drawn, methods=some(["zv"], ur5e, paper), named=1))
 

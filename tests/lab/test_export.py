@@ -110,17 +110,6 @@ class TestLayout:
         assert table.columns[0] == "timestamp"
         assert (table["tick"].dtype, table["actual_q_5"].dtype) == (pl.Int64, pl.Float64)
 
-    def test_tables_without_our_description_are_read_as_foreign_logs(self, tmp_path):
-        q = 0.01 * np.cumsum(np.random.default_rng(0).standard_normal((500, 6)), axis=0)
-        time = np.arange(500) * 0.002
-        np.savez(tmp_path / "own.npz", timestamp=time, actual_q=q)
-        flat = {"timestamp": time} | {f"actual_q_{i}": q[:, i] for i in range(6)}
-        pl.DataFrame(flat).write_parquet(tmp_path / "own.parquet")
-        for name in ("own.npz", "own.parquet"):
-            found = read(tmp_path / name)
-            assert found.foreign
-            assert np.array_equal(found["actual_q"], q)
-
 
 @pytest.mark.parametrize(("kind", "prefix"), [(State, ""), (Truth, "truth_"), (Io, "")])
 def test_every_number_of_a_message_has_a_meaning_and_every_float_a_unit(kind, prefix):

@@ -1,4 +1,4 @@
-"""What is exported for Foxglove draws the arm where it was, and is still the recording that it was."""
+"""An export for Foxglove draws the arm where it was, and keeps all messages of the recording."""
 
 import json
 from pathlib import Path

@@ -63,7 +63,7 @@ SURE = set(FAULTS) - {"few motions", "slow", "loud"}
     gyroscope=st.booleans(),
 )
 def test_joined_rows_are_within_3_ms_or_refused(tmp_path_factory, seed, offset, drift, fault, gyroscope):
-    devices = TwoDevices(seed, offset, drift, **FAULTS[fault])
+    devices = TwoDevices(seed, offset, drift, **{"motions": 5} | FAULTS[fault])
     sensor, why = {} if gyroscope else {"names": FORCE}, ""
     try:
         found = join(tmp_path_factory.mktemp("log"), devices, sensor=sensor)

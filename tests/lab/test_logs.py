@@ -38,7 +38,7 @@ FORMATS = {
 }
 
 
-@pytest.mark.parametrize(("form", "lag"), [("commas", 0.0), *((form, 0.025) for form in FORMATS)])
+@pytest.mark.parametrize(("form", "lag"), [(form, 0.025 * (form != "commas")) for form in FORMATS])
 def test_motions_and_modes_are_found_in_every_format(tmp_path, form, lag):
     log = SyntheticLog(lag=lag, motions=1)
     (result,) = analyze(read(FORMATS[form](log, tmp_path)))
@@ -49,8 +49,8 @@ def test_motions_and_modes_are_found_in_every_format(tmp_path, form, lag):
 
 
 def test_slow_log_is_measured(tmp_path):
-    log = SyntheticLog(rate=100.0, lag=0.025)
-    assert [within(result) for result in analyze(read(log.csv(tmp_path / "log.csv")))] == [True, True]
+    log = SyntheticLog(rate=100.0, lag=0.025, motions=1)
+    assert [within(result) for result in analyze(read(log.csv(tmp_path / "log.csv")))] == [True]
 
 
 def test_rosbag_may_have_any_joint_order_and_slow_joint_states(tmp_path):
@@ -63,9 +63,21 @@ def test_rosbag_may_have_any_joint_order_and_slow_joint_states(tmp_path):
     assert result.stop_s == pytest.approx(log.stops[0] + 0.025, abs=0.02)
 
 
-def test_motions_without_a_target_come_from_measured_angles(tmp_path):
-    log = SyntheticLog().without("target_q")
-    results = analyze(read(log.csv(tmp_path / "log.csv")))
+@pytest.fixture(scope="module")
+def of_two_motions(tmp_path_factory):
+    """Measure a log of two motions without some columns; each is measured once."""
+
+    @cache
+    def measured(*without):
+        log = SyntheticLog(rate=250.0).without(*without)
+        return log, MeasuredRecording.of(read(log.csv(tmp_path_factory.mktemp("log") / "log.csv")))
+
+    return measured
+
+
+def test_motions_without_a_target_come_from_measured_angles(of_two_motions):
+    log, measured = of_two_motions("target_q")
+    results = measured.results
     assert [result.stop_s for result in results] == pytest.approx(log.stops, abs=0.03)
     assert all(within(result) for result in results)
     assert "actual_q" in results[0].notes["stop_s"]
@@ -106,24 +118,22 @@ def test_rotated_tool_changes_no_result(tmp_path):
 
 
 def test_missing_rows_do_not_bias_the_fit(tmp_path):
-    log = SyntheticLog(lag=0.025)
+    log = SyntheticLog(lag=0.025, motions=1)
     random = np.random.default_rng(0)
     kept = random.random(len(log.columns["timestamp"])) > 0.2
     kept[1100:1110] = False
     log.columns = {name: column[kept] for name, column in log.columns.items()}
     recording = read(log.csv(tmp_path / "log.csv"))
-    assert recording.missing_ticks > 300
+    assert recording.missing_ticks > 250
     assert any("rows are missing" in note for note in recording.notes)
     assert all(within(result) for result in analyze(recording))
 
 
-@cache
-def good():
-    return tuple(text(SyntheticLog().columns))
+GOOD = SyntheticLog(motions=1).columns
 
 
 def lines_of(tmp_path):
-    return tmp_path / "log.csv", list(good())
+    return tmp_path / "log.csv", text(GOOD)
 
 
 def with_cell(lines, cell, row=300, column=4):
@@ -160,7 +170,7 @@ EDITED = {
         ],
         "2 rows out of order sorted by timestamp, the first in line 402",
     ),
-    "cut off": (lambda lines: [*lines[:-1], lines[-1][:-5]], "line 2701 has no end and was left out"),
+    "cut off": (lambda lines: [*lines[:-1], lines[-1][:-5]], "line 1501 has no end and was left out"),
 }  # changes of the lines of a good log without its last line break, and the note on them
 
 
@@ -172,11 +182,13 @@ def test_damaged_lines_are_omitted_or_sorted_with_a_note(tmp_path, kind):
     recording = read(path)
     assert any(re.search(words, note) for note in recording.notes)
     assert np.all(np.diff(recording.time) > 0)
-    assert all(within(result) for result in analyze(recording))
+    rows = np.searchsorted(GOOD["timestamp"], recording.time)
+    assert len(rows) >= len(GOOD["timestamp"]) - 1
+    assert all(np.array_equal(recording[name], column[rows]) for name, column in GOOD.items())
 
 
 REFUSED = {
-    "goes back": (lambda lines: lines + lines[1:300], r"line 2702.*goes back from 105.398 to 100 s"),
+    "goes back": (lambda lines: lines + lines[1:300], r"line 1502.*goes back from 102.998 to 100 s"),
     "a word": (lambda lines: with_cell(lines, "north"), r"line 301, column target_q_3: 'north'"),
     "no time": (lambda lines: [line.split(",", 1)[1] for line in lines], "no column timestamp"),
     "a name twice": (lambda lines: [",".join(line.split(",")[:1] * 2) for line in lines], "twice"),
@@ -229,19 +241,18 @@ def test_missing_files_and_folders_without_a_rosbag_are_refused(tmp_path):
         read(tmp_path)
 
 
-def test_corresponding_motions_are_compared_and_others_listed(tmp_path):
-    def measured_of(log):
-        return MeasuredRecording.of(read(log.csv(tmp_path / "log.csv")))
-
-    loud = measured_of(SyntheticLog())
-    both = compare(loud, measured_of(SyntheticLog(modes=((9.0, 0.12, 0.25),), seed=2)))
+def test_corresponding_motions_are_compared_and_others_listed(of_two_motions, tmp_path):
+    _, loud = of_two_motions()
+    log = SyntheticLog(modes=((9.0, 0.12, 0.25),), seed=2, rate=250.0)
+    both = compare(loud, MeasuredRecording.of(read(log.csv(tmp_path / "log.csv"))))
     assert [(motion.a, motion.b) for motion in both.motions] == [(1, 1), (2, 2)]
     for motion in both.motions:
         assert motion.impact_percent["residual_vibration"] == pytest.approx(-75.0, abs=8.0)
-    short = compare(loud, measured_of(SyntheticLog(motions=1)))
+    short = compare(loud, MeasuredRecording(loud.recording, loud.motions[:1], loud.results[:1]))
     assert [(motion.a, motion.b) for motion in short.motions] == [(1, 1)]
     assert (short.only_in_a, short.only_in_b) == ((2,), ())
-    seven = compare(loud, measured_of(SyntheticLog(joints=7, motions=1)))
+    other = read(SyntheticLog(joints=7, motions=1).csv(tmp_path / "seven.csv"))
+    seven = compare(loud, MeasuredRecording(other, motions(other), []))
     assert (seven.motions, seven.only_in_a, seven.only_in_b) == ((), (1, 2), (1,))
 
 
@@ -251,7 +262,7 @@ def test_log_at_rest_has_no_motion(tmp_path):
 
 
 def test_damaged_packet_is_omitted_and_later_ones_are_read(tmp_path):
-    path = SyntheticLog().dump(tmp_path / "dump")
+    path = SyntheticLog(motions=1).dump(tmp_path / "dump")
     data = path.read_bytes()
     path.write_bytes(data[:600_000] + data[600_037:])
     recording = read(path)
@@ -264,7 +275,7 @@ def test_csv_may_be_gzipped_but_not_a_decompression_bomb(tmp_path):
     packed = tmp_path / "log.csv.gz"
     packed.write_bytes(gzip.compress(plain.read_bytes()))
     assert np.array_equal(read(packed)["actual_q"], read(plain)["actual_q"])
-    packed.write_bytes(gzip.compress(bytes(200 << 20), 9))
+    packed.write_bytes(gzip.compress(bytes(20 << 20), 9))
     with pytest.raises(RecordingError, match=r"log\.csv\.gz grows beyond 100 times its size"):
         read(packed)
     packed.write_bytes(gzip.compress(plain.read_bytes())[:100_000])
@@ -273,29 +284,28 @@ def test_csv_may_be_gzipped_but_not_a_decompression_bomb(tmp_path):
 
 def test_any_names_units_and_separators_are_read(tmp_path):
     log = SyntheticLog(lag=0.025, motions=1)
-    expected = analyze(read(log.csv(tmp_path / "log.csv")))
-    one = {
+    expected = read(log.csv(tmp_path / "log.csv"))
+    log.columns = {
         "t": 1e3 * log.columns["timestamp"],
         "joint": np.degrees(log.columns["actual_q"]),
         "plan": np.degrees(log.columns["target_q"]),
         "acc": log.columns["actual_tool_accelerometer"] / 9.80665,
     }
-    log.columns = one
     path = log.csv(tmp_path / "other.csv", ";", lambda value: repr(value).replace(".", ","))
     given = "time=t:ms,q=joint_{}:deg,target_q=plan_{}:deg,accelerometer=acc_{}:g"
     for columns in (given, "time=t,q=joint_{}:deg,target_q=plan_{}:deg,accelerometer=acc_{}"):
         recording = read(path, columns)
-        found = analyze(recording)
-        assert [one.f_d_hz for one in found] == pytest.approx([one.f_d_hz for one in expected], rel=1e-3)
-        assert [one.stop_s for one in found] == pytest.approx([one.stop_s for one in expected], abs=1e-6)
+        for name in recording.columns:
+            assert recording[name] == pytest.approx(expected[name], abs=1e-9), name
         said = [note for note in recording.notes if "taken as" in note]
         assert len(said) == (0 if columns is given else 2)
-    with pytest.raises(RecordingError, match=r"no column 'axis_\{\}' for q; its columns are t, joint_0"):
-        read(path, "time=t,q=axis_{}")
-    with pytest.raises(RecordingError, match="write NAME=COLUMN"):
-        read(path, "time=t:weeks")
-    with pytest.raises(RecordingError, match="--columns time="):
-        read(path)
+    for columns, words in (
+        ("time=t,q=axis_{}", r"no column 'axis_\{\}' for q; its columns are t, joint_0"),
+        ("time=t:weeks", "write NAME=COLUMN"),
+        (None, "--columns time="),
+    ):
+        with pytest.raises(RecordingError, match=words):
+            read(path, columns)
 
 
 def test_vibration_at_the_end_is_not_called_noise(tmp_path):
@@ -391,10 +401,11 @@ def test_vectors_of_a_table_may_have_any_name(tmp_path, kind):
         lists = pl.Series("observation.state", q, dtype=pl.Array(pl.Float64, 2))
         lists = lists if kind == "arrays" else lists.arr.to_list()
         pl.DataFrame([pl.Series("stamp", t), lists]).write_parquet(path)
-    if kind == "lists":
+    if kind == "npz":
         with pytest.raises(RecordingError, match=r"are stamp, observation\.state_0, observation\.state_1"):
             read(path)
     found = read(path, "time=stamp,q=observation.state_{}:rad")
+    assert found.foreign
     assert found["actual_q"] == pytest.approx(q)
 
 
@@ -420,9 +431,9 @@ def test_user_format_is_a_function(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("without", [(), ("target_q",)])
-def test_pause_of_any_length_changes_no_result_and_takes_no_memory(without, tmp_path):
-    log, pause = SyntheticLog().without(*without), 7e8
-    expected = analyze(read(log.csv(tmp_path / "log.csv")))
+def test_pause_of_any_length_changes_no_result_and_takes_no_memory(without, of_two_motions, tmp_path):
+    log, pause = SyntheticLog(rate=250.0).without(*without), 7e8
+    expected = of_two_motions(*without)[1].results
     middle = len(log.columns["timestamp"]) // 2
     log.columns["timestamp"][middle:] += pause
     found = analyze(read(log.csv(tmp_path / "log.csv")))

@@ -353,12 +353,12 @@ HOSTILE = {
     "more numbers than there is memory": ("npz", _header((10**13,))),
     "more numbers than there are": ("npz", _header((2**62, 2**62))),
     "100,000 nested elements": ("urdf", _written(".urdf", "<robot>" + "<link>" * 10**5)),
-    "a chain of 20,000 links": ("urdf", _written(".urdf", _links(20_000, "chain"))),
-    "20,000 links on one": ("urdf", _written(".urdf", _links(20_000, "star"))),
+    "a chain of 5,000 links": ("urdf", _written(".urdf", _links(5_000, "chain"))),
+    "5,000 links on one": ("urdf", _written(".urdf", _links(5_000, "star"))),
     "entities of entities": ("urdf", _written(".urdf", f"<!DOCTYPE a [<!ENTITY l0 'l'>{LAUGHS}]><robot>&l29;</robot>")),
-    "a sweep of 300,000 payloads": (
+    "a sweep of 100,000 payloads": (
         "sweep",
-        _written(".toml", f"shapers=['zv']\nmoves=1\npayloads=[{','.join(f'{n}e-5' for n in range(300_000))}]"),
+        _written(".toml", f"shapers=['zv']\nmoves=1\npayloads=[{','.join(f'{n}e-5' for n in range(100_000))}]"),
     ),
     "a number of 5,000 digits": ("moves", _written(".json", f"[{{'start': [{'1' * 5000}]}}]".replace("'", '"'))),
 }  # fmt: skip
@@ -387,6 +387,7 @@ def main(folder: Path, count: int, kinds: list[str]) -> None:
 
 
 def _read_bad(kind, count, good, read, refusal, write):
+    good = good[:count]
     for path in good:
         read(path)
     taken = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
@@ -417,7 +418,7 @@ def test_malicious_file_does_not_hang_its_reader(tmp_path, measured):
     _try(HOSTILE, 1, tmp_path, measured)
 
 
-@pytest.mark.parametrize("count", [20, pytest.param(400, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("count", [12, pytest.param(400, marks=pytest.mark.nightly)])
 def test_damaged_file_is_read_or_refused(count, tmp_path, measured):
     _try(KINDS, count, tmp_path, measured)
 

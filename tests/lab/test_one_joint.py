@@ -97,4 +97,4 @@ def test_page_has_the_computed_values(done):
         figures = (one.inertia, one.f_d, one.simulated_f_d, one.zeta, one.simulated_zeta)
         cells = [f"{value:.{digits}f}" for value, digits in zip(figures, (3, 2, 2, 3, 3), strict=True)]
         assert f"| {math.degrees(one.elbow):.0f}° | {' | '.join(cells)} |" in found
-    assert f"within {done.worst_f_d:.2f} %, the damping ratios within {done.worst_zeta:.1f} %" in found
+    assert f"within {done.worst('f_d'):.2f} %, the damping ratios within {done.worst('zeta'):.1f} %" in found

@@ -132,7 +132,7 @@ def draws(count, correlation):
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.9])
-@pytest.mark.parametrize(("count", "least"), [(14, 0.85), pytest.param(200, 0.90, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize(("count", "least"), [(8, 0.85), pytest.param(200, 0.90, marks=pytest.mark.nightly)])
 def test_intervals_contain_the_truth_at_their_confidence(count, least, correlation, measured):
     """Through white noise and that of a filtered sensor, of which few modes are made."""
     fits = [draw for draw in draws(count, correlation) if draw[0].ok]
@@ -173,7 +173,7 @@ def rung(random, modes, rate, correlation, seconds=1.5):
 @pytest.mark.parametrize("correlation", [0.0, 0.9])
 def test_intervals_contain_two_close_modes(correlation, measured):
     inside, found = [], 0
-    for seed in range(6):
+    for seed in range(3):
         random = np.random.default_rng([seed, 7])
         f_d = random.uniform(6.0, 18.0)
         first = (f_d, random.uniform(0.01, 0.06), 1.0)
@@ -197,7 +197,7 @@ def test_intervals_contain_two_close_modes(correlation, measured):
 def test_intervals_contain_a_mode_that_changes_with_amplitude(measured):
     """f_d rises by 3 % and ζ falls to a half with the amplitude; the truth is the mean over the energy."""
     inside = []
-    for seed in range(6):
+    for seed in range(4):
         random = np.random.default_rng([seed, 11])
         f_d, zeta, step = random.uniform(7.0, 18.0), random.uniform(0.03, 0.06), 5e-4
         amplitude, phase, courses = 1.0, 0.0, []
@@ -223,6 +223,14 @@ def test_intervals_contain_a_mode_that_changes_with_amplitude(measured):
 
 ROBOT = load("ur5e")
 PAYLOAD = body(paper_payload(ROBOT, 2.0))
+FEW_BASES = BASES[::4]
+
+
+@pytest.fixture
+def listener(monkeypatch):
+    """A listener that tries five stiffnesses of the arm's base, of which the first is rigid."""
+    monkeypatch.setattr("tvist_lab.metrics.ring_listener.BASES", FEW_BASES)
+    return RingListener(ROBOT, PAYLOAD)
 
 
 def ring_down(listener, base, q, factor, amplitude, random):
@@ -238,16 +246,15 @@ def poses(random):
     return random.uniform([-3, -3, -2.5, -3, -2, -2], [3, 0, 2.5, 0, 2, 2])
 
 
-@pytest.mark.parametrize("base", [0, 12])
-def test_frequency_factor_and_base_are_found(base):
-    random = np.random.default_rng(base)
-    listener, first = RingListener(ROBOT, PAYLOAD), []
+@pytest.mark.parametrize("base", [0, 3])
+def test_frequency_factor_and_base_are_found(listener, base):
+    random, first = np.random.default_rng(base), []
     for _ in range(FIRST):
         q = poses(random)
         assert not first
         first = listener.study(ring_down(listener, base, q, 1.05, 0.8, random), q)
     assert len(first) >= FIRST - 2
-    assert abs(np.log(BASES[listener._base] / BASES[base])) < 0.5
+    assert listener._base == base
     later = []
     for _ in range(10):
         q = poses(random)
@@ -257,22 +264,20 @@ def test_frequency_factor_and_base_are_found(base):
     assert np.mean(np.abs(values - np.log(0.85)) < 3.0 * errors + 0.02) > 0.7
 
 
-def test_stop_without_vibration_gives_no_factor():
-    random = np.random.default_rng(1)
-    listener, found = RingListener(ROBOT, PAYLOAD), []
+def test_stop_without_vibration_gives_no_factor(listener):
+    random, found = np.random.default_rng(1), []
     for _ in range(FIRST + 10):
         q = poses(random)
         found += listener.study(ring_down(listener, 0, q, 1.0, 0.0, random), q)
     assert len(found) <= 2
 
 
-def test_stop_with_missing_readings_is_ignored():
-    random = np.random.default_rng(2)
-    listener, found = RingListener(ROBOT, PAYLOAD), []
+def test_stop_with_missing_readings_is_ignored(listener):
+    random, found = np.random.default_rng(2), []
     for stop in range(FIRST + 1):
         q = poses(random)
-        alpha = ring_down(listener, 12, q, 1.0, 0.8, random)
+        alpha = ring_down(listener, 3, q, 1.0, 0.8, random)
         alpha[20, 0] = np.nan if stop == 0 else alpha[20, 0]
         found += listener.study(alpha, q)
     assert len(found) >= FIRST - 2
-    assert abs(np.log(BASES[listener._base] / BASES[12])) < 0.5
+    assert listener._base == 3

@@ -1,9 +1,10 @@
 """Every executor gives each task its result or its failure, whatever happens to the others."""
 
 import threading
-from contextlib import contextmanager
+from contextlib import nullcontext
 from pathlib import Path
 
+import dask
 import pytest
 from distributed import Client, LocalCluster
 from polars.testing import assert_frame_equal
@@ -21,10 +22,19 @@ from tvist_lab.study.work import measure
 ROOT = str(Path(__file__).parents[2])
 
 
-@contextmanager
-def cluster():
-    """An executor of a Dask cluster on this machine."""
+@pytest.fixture(scope="module", autouse=True)
+def _importable():
+    """Other processes import the work by its name; they inherit this path."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(ROOT)
+        yield
+
+
+@pytest.fixture(scope="module")
+def cluster(_importable):
+    """A Dask cluster on this machine, which gives up a task that has ended two workers."""
     with (
+        dask.config.set({"distributed.scheduler.allowed-failures": 1}),
         LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=60) as local,
         Client(local, set_as_default=False) as client,
     ):
@@ -32,13 +42,11 @@ def cluster():
         client.wait_for_workers(2)  # Dask cannot end a worker that it is just starting again
 
 
-EXECUTORS = {"processes": lambda: processes(2), "dask": cluster, "here": InlineExecutor}
-
-
-@pytest.fixture(autouse=True)
-def importable(monkeypatch):
-    """Other processes import the work by its name; they inherit this path."""
-    monkeypatch.syspath_prepend(ROOT)
+EXECUTORS = {
+    "processes": lambda _: processes(2),
+    "dask": lambda request: nullcontext(request.getfixturevalue("cluster")),
+    "here": lambda _: InlineExecutor(),
+}
 
 
 @pytest.mark.parametrize("number", [1, pytest.param(2, marks=pytest.mark.nightly)])
@@ -53,9 +61,9 @@ def test_study_results_are_equal_in_one_and_in_several_processes(ur5e, number):
 
 
 @pytest.mark.parametrize("executor", EXECUTORS.values(), ids=EXECUTORS)
-def test_each_task_gets_its_result_or_failure(executor):
+def test_each_task_gets_its_result_or_failure(executor, request):
     tasks = [*range(30), threading.Lock()]
-    with executor() as pool:
+    with executor(request) as pool:
         got = dict(outcomes(pool, square_or_raise, tasks))
     assert sorted(got) == list(range(31))
     failed = {index: one.error for index, one in got.items() if isinstance(one, Failed)}
@@ -75,8 +83,7 @@ def test_ended_worker_process_ends_the_run():
         list(outcomes(pool, die, range(20)))
 
 
-def test_task_that_ends_every_worker_fails():
-    with cluster() as pool:
-        got = dict(outcomes(pool, die, range(30)))
+def test_task_that_ends_every_worker_fails(cluster):
+    got = dict(outcomes(cluster, die, range(30)))
     assert "died" in str(got[5].error)
     assert sum(isinstance(one, Failed) for one in got.values()) <= 3

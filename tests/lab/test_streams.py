@@ -56,7 +56,7 @@ def peaks(q):
 
 
 def streamed(tvist, reference):
-    """What a filter makes of a stream, whose end nobody tells it; shape (T, n) [rad]."""
+    """Return a stream after a filter that does not know where it will end, shape (T, n) [rad]."""
     tvist.reset(reference[0])
     tvist.aim(None)
     return np.array([tvist.filter(q) for q in reference])
@@ -84,7 +84,7 @@ def test_filter_without_a_target_follows_a_stream():
     ("name", "most"), [("auto", 1.011), ("short", 1.009), ("auto-target", 1.009), ("product", 1.004)]
 )
 def test_long_streams_keep_velocity_and_99_percent_of_acceleration(name, most):
-    """What is left is half the second derivative of the delays' variance; independent joints make the most of it."""
+    """The rest is half the second derivative of the delays' variance: most for independent joints."""
     for number, mass in enumerate(MASSES):
         for together in (False, True):
             stream = retargeted(SECONDS, 1000 + 10 * number + together, wrists=False, together=together)

@@ -15,7 +15,6 @@ from tvist_lab.report import study_figures
 from tvist_lab.runners import Failed, TaskError, processes
 from tvist_lab.studies import sweep
 from tvist_lab.studies.sweep import Spec, SpecError, SweptRobot, read_spec, setting_name
-from tvist_lab.study.arms import scattered
 from tvist_lab.study.case import Case, arm_seed
 from tvist_lab.study.engine import run as run_study
 from tvist_lab.study.method import Named
@@ -25,6 +24,7 @@ from tvist_lab.study.store import Store, StoreError
 from tvist_lab.study.study import StudyError, read_study
 from tvist_lab.study.work import Job, failed, measure, measure_each
 from tvist_plant.description import load
+from tvist_plant.variants import scattered
 
 SPEC = """
 shapers = ["none", "zv"]

@@ -83,7 +83,7 @@ class Driven:
         return plant.play(self.driven.commands)
 
     def recorded(self, response, sensors, seed):
-        """What a robot records of an arm's response, with these gains of its torque sensors and some noise."""
+        """Return a robot's recording of a response, with gains and noise of its torque sensors."""
         kept, measured = slice(self.first, self.stop + AFTER), response.measured
         noise = 0.5 * np.random.default_rng([seed, 99]).standard_normal(measured.moment.shape)
         moment = (sensors * measured.moment + noise)[kept]
@@ -97,7 +97,7 @@ class Driven:
 
 
 def taken_for(payload):
-    """What a robot takes its arm for that was told a payload."""
+    """Return what a robot believes about its arm after a payload was declared."""
     return FilterState("zv", 1, first_source(ROBOT, None), payload, payload)
 
 

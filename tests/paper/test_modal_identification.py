@@ -7,6 +7,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from tvist_controller.api.line import MotionLimits
 from tvist_controller.foresight.collision import CollisionModel
 from tvist_controller.setup import body, paper_payload
 from tvist_controller.sources.calibrations import modal_estimator
@@ -23,37 +24,77 @@ from tvist_protocol.calibration import calibration_from_json, calibration_to_jso
 
 ROBOT = load("ur5e")
 PAYLOADS = (paper_payload(ROBOT, 0.0), paper_payload(ROBOT, 5.0))
+FEWER = {
+    "jogs.CANDIDATES": 12,
+    "jogs.CANDIDATES_PER_JOG": 2,
+    "jogs.WAYS": MotionLimits(velocity=3.0, acceleration=8.0, jerk=500.0),
+    "calibrate.CANDIDATES": 10,
+    "calibrate.PLACES": 5,
+    "calibrate.UNSEEN": 20,
+    "calibrate.WORKSPACE": 20,
+    "friction.LENGTH": 0.2,
+    "friction.ROUNDS": 2,
+    "modal_fit.SOFTENINGS": (0.0, 100.0),
+    "modal_fit.STARTS": 2,
+    "forecast.SINGLY": 0,
+    "forecast.FOLDS": 2,
+}
+"""Constants of an identification with fewer choices and fits than usual, and quicker ways."""
 
 
-def measured(ring_downs, seed, payloads=PAYLOADS, description=ROBOT):
+def recorded(ring_downs, seed, payloads=PAYLOADS, description=ROBOT):
+    """Jogs of the robot."""
+
     async def run():
-        setup = replace(free_setup(calibration="none", seed=seed), description=ROBOT)
+        setup = replace(free_setup(calibration="none", seed=seed, truth=False), description=ROBOT)
         async with robot_in_process(setup) as robot, robot.control("test") as arm:
             plan = await plan_jogs(robot, description, ring_downs, payloads=payloads, seed=seed)
             return await make_jogs(robot, arm, plan, lambda _: None)
 
-    return calibrate(ROBOT, asyncio.run(run()), name="test", command="a test", progress=lambda _: None)
+    return asyncio.run(run())
+
+
+def identified(jogs):
+    return calibrate(ROBOT, jogs, name="test", command="a test", progress=lambda _: None)
 
 
 @pytest.fixture(scope="module")
-def done():
-    return measured(6, seed=11)
+def _fewer():
+    with pytest.MonkeyPatch.context() as fewer:
+        for name, value in FEWER.items():
+            fewer.setattr(f"tvist_lab.identification.{name}", value)
+        yield
 
 
 @pytest.fixture(scope="module")
-def synthetic():
+def jogs(_fewer):
+    return recorded(5, seed=11)
+
+
+@pytest.fixture(scope="module")
+def done(jogs):
+    return identified(jogs)
+
+
+@pytest.fixture(scope="module")
+def synthetic(_fewer):
     """Ring-downs of the arm as guessed, with the noise of the accelerometer."""
     arm = ArmModes(ROBOT, PAYLOADS)
     candidates = free_configurations(ROBOT, PAYLOADS, 16, 5)
     rng = np.random.default_rng(6)
     rings = []
-    for number, q in enumerate(candidates[:8]):
+    for number, q in enumerate(candidates[:5]):
         ring = predicted(arm, q, number % 2)
         rings.append(replace(ring, force=ring.force + rng.normal(0.0, ring.noise, ring.force.shape)))
     return arm, candidates, rings
 
 
-def test_six_ring_downs_predict_modes_at_new_poses_and_payloads(done):
+def test_jogs_with_each_payload_in_turn_are_recorded(jogs):
+    assert [log.payload.mass for log in jogs.logs] == [0.0] * 3 + [5.0] * 2
+    assert jogs.no_friction == ""
+
+
+def test_five_ring_downs_predict_modes_at_new_poses_and_payloads(done):
     first, second, third = true_errors(ROBOT, done.calibration, PAYLOADS, 11)
     assert first.f_d.median < 3.0
     assert second.f_d.median < 4.0
@@ -64,8 +105,7 @@ def test_six_ring_downs_predict_modes_at_new_poses_and_payloads(done):
 def test_calibration_has_errors_and_origin(done):
     calibration, model = done.calibration, done.calibration.modal
     assert calibration.robot == ROBOT.robot.model
-    assert calibration.provenance.ring_downs == len(model.ring_downs) == 6
-    assert [ring.payload for ring in model.ring_downs].count(0) == 3
+    assert calibration.provenance.ring_downs == len(model.ring_downs) == 5
     assert [payload.mass for payload in model.payloads] == [0.0, 5.0]
     assert 0.8 < model.residual_to_noise < 1.3
     status = {(p.quantity, p.joints): p for p in model.parameters}
@@ -87,24 +127,25 @@ def test_calibration_has_errors_and_origin(done):
 
 
 @pytest.mark.nightly
+@pytest.mark.usefixtures("_fewer")
 def test_one_payload_suffices_for_that_payload():
-    found = measured(6, seed=3, payloads=())
+    found = identified(recorded(6, seed=3, payloads=()))
     assert [payload.mass for payload in found.calibration.modal.payloads] == [5.0]
     assert found.calibration.modal.cross_validated_f_d_percent[0].median < 5.0
 
 
 def test_too_few_ring_downs_are_refused_before_the_arm_moves():
     with pytest.raises(IdentificationError, match="at least 4 are needed"):
-        measured(3, seed=0)
+        recorded(3, seed=0)
     many = tuple(paper_payload(ROBOT, float(mass)) for mass in range(6))
     with pytest.raises(IdentificationError, match="at least 6 are needed"):
-        measured(5, seed=0, payloads=many)
+        recorded(5, seed=0, payloads=many)
 
 
 def test_file_of_another_robot_is_refused():
     other = msgspec.structs.replace(ROBOT, robot=msgspec.structs.replace(ROBOT.robot, model="other"))
     with pytest.raises(IdentificationError, match="is a UR5e"):
-        measured(4, seed=0, description=other)
+        recorded(4, seed=0, description=other)
 
 
 def test_parameters_are_found_from_noisy_ring_downs(synthetic):

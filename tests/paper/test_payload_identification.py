@@ -19,11 +19,15 @@ INERTIA = (0.002, 0.0, 0.0, 0.002, 0.0, 0.002)
 @pytest.fixture(autouse=True)
 def _few_poses(monkeypatch):
     monkeypatch.setattr("tvist_lab.identification.payload.POSES", 3)
+    monkeypatch.setattr("tvist_lab.identification.payload.CANDIDATES", 15)
 
 
 def found(mass, com, *, declared=2.0, seed=2, description=ROBOT):
     async def run():
-        async with robot_in_process(free_setup(seed=seed)) as robot, robot.control("test") as arm:
+        async with (
+            robot_in_process(free_setup(seed=seed, truth=False)) as robot,
+            robot.control("test") as arm,
+        ):
             await arm.reset(payload=make_payload(mass, com, INERTIA if mass else (0.0,) * 6))
             await arm.set_payload(declared, (0.0, 0.0, 0.04), INERTIA)
             return await identify_payload(robot, arm, description, seed=seed, progress=lambda _: None)

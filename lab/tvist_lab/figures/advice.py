@@ -75,9 +75,8 @@ def _costs(advice: Advice) -> Figure:
         panel.plot(*_place(advice.best), "o", **ring)
         strong = {"color": color, "fontweight": "bold", "ha": "center", "bbox": None}
         note(panel, _short(advice.best), _place(advice.best), (0, -24), **strong)
-    panel.set_yscale("log")
     lowest = 0.7 * max(min(one.left_percent for one in fair), MIN_DRAWN_PERCENT)
-    panel.set(xlim=(0.0, 1.05e3 * longest), ylim=(lowest, 110.0))
+    panel.set(yscale="log", xlim=(0.0, 1.05e3 * longest), ylim=(lowest, 110.0))
     panel.set(xlabel="Time added to a motion (ms)", ylabel="Shake that is left (%)")
     decades(panel, "y")
     title(panel, "What each shaper leaves, and costs")

@@ -66,7 +66,7 @@ def after_stop_figure(unshaped: Recorded, shaped: Recorded, what: str) -> Figure
     top = HEADROOM * max(*peaks, STILL)
     said = (
         f"without shaping: {peaks[0]:.2f} m/s²",
-        f"with shaping: {peaks[1]:.2f} m/s², {MotionChange(peaks[0], peaks[1], None, None).less()}",
+        f"with shaping: {peaks[1]:.2f} m/s², {MotionChange(*peaks).less()}",
     )
     rests: list[float | None] = []
     for (recording, motion), words, height, style in zip(
@@ -228,8 +228,9 @@ def ring_down_figure(name: str, recorded: Recorded) -> Figure:
         spectrum.axvline(mode.f_d, **OF_UNSHAPED.line(width))
         top = {"xycoords": ("data", "axes fraction"), "weight": weight}
         note(spectrum, f"{mode.f_d:.1f}", (mode.f_d, 1.0), (3, -9), **top)
-    spectrum.set(xlabel="Frequency (Hz)", ylabel=r"Spectrum of $\alpha$ (m/s)", xlim=(0.0, HIGHEST))
-    spectrum.set_ylim(bottom=0.0)
+    spectrum.set(
+        xlim=(0.0, HIGHEST), ylim=(0.0, None), xlabel="Frequency (Hz)", ylabel=r"Spectrum of $\alpha$ (m/s)"
+    )
 
     _draw_levels(levels, time, alpha, fit)
     levels.set_xlim(-1e3 * BEFORE_S, 1e3 * (time[-1] - 0.5 * BLOCK))

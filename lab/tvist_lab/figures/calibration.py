@@ -61,9 +61,8 @@ def move_plan_figure(plan: JogPlan) -> Figure:
                 panel.plot(points[:, 0], points[:, across], label=None if number else label, **how)
         for number, points in enumerate(rings, 1):
             note(panel, str(number), (points[-1, 0], points[-1, across]), (3, 3))
-        panel.set_aspect("equal")
         panel.margins(0.08)
-        panel.set(xlabel="x (m)", ylabel="z (m)" if across == 2 else "y (m)")
+        panel.set(aspect="equal", xlabel="x (m)", ylabel="z (m)" if across == 2 else "y (m)")
         title(panel, f"{plan.arm.description.robot.model} {what}")
     legend(figure, axes[0])
     return figure

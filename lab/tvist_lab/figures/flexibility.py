@@ -119,9 +119,8 @@ def figure_1() -> Figure:
         ("Payload", [-1], OF_THIRD.points(6.0, zorder=5)),
     ):
         side.plot(bent[rows, 0], bent[rows, 2], label=label, **how)
-    side.set_aspect("equal")
     side.margins(0.08, 0.35)
-    side.set(xlabel="Along the arm (m)", ylabel="Height (m)")
+    side.set(aspect="equal", xlabel="Along the arm (m)", ylabel="Height (m)")
     note(side, f"flange {1e3 * arm.moved(springs):.2f} mm away", tuple(bent[-1, ::2]), (6, 12), ha="right")
     title(side, "UR5e with 5 kg, from the side, after a stop")
 
@@ -169,16 +168,15 @@ def figure_2(modes: OneJointModes) -> Figure:
             panel.plot(elbow, formula, **style.line(1.6, label=f"{mass:g} kg, formula"))
             panel.plot(elbow, simulated, **hollow)
     for panel in (frequencies, dampings):
-        panel.set(xlim=(-4.0, 154.0), xticks=np.arange(0.0, 151.0, 30.0))
-        panel.set_ylim(bottom=0.0)
+        panel.set(xlim=(-4.0, 154.0), xticks=np.arange(0.0, 151.0, 30.0), ylim=(0.0, None))
         for pose in modes.poses:
             panel.axvline(np.degrees(pose.elbow), color=FAINT, linewidth=0.9, linestyle=LIMIT)
     frequencies.set_ylabel("Damped frequency $f_d$ (Hz)")
     frequencies.tick_params(labelbottom=False)
     dampings.set(ylabel="Damping ratio ζ (–)", xlabel="Elbow $q$, 0 stretched out (°)")
-    said = f"    simulated within {modes.worst_f_d:.2f} %"
+    said = f"    simulated within {modes.worst('f_d'):.2f} %"
     remark(frequencies, r"$f_d=\frac{1}{2\pi}\sqrt{\frac{K}{I(q)}\,}\sqrt{1-\zeta^2}$" + said, (0.02, 0.1))
-    said = f"    simulated within {modes.worst_zeta:.1f} %"
+    said = f"    simulated within {modes.worst('zeta'):.1f} %"
     remark(dampings, r"$\zeta=\frac{D}{2\sqrt{K\,I(q)}}$" + said, (0.02, 0.14))
     symbols = {"$I$": "inertia about the shoulder", "$K$, $D$": "stiffness and damping of its flexible drive"}
     legend(figure, frequencies, symbols)

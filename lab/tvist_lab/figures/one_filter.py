@@ -116,8 +116,9 @@ def figure_7() -> Figure:
     delays.set(ylabel=r"Delay $\tau_2$ (ticks)")
     errors.set(ylabel=r"Error of $q^*$ (mrad)")
     accelerations.set_yscale("symlog", linthresh=10.0)
-    accelerations.set(xlabel="Time (ms)", ylabel=r"$\ddot q^*$ (rad/s²)", xlim=(0.0, 1e3 * duration))
-    accelerations.set_ylim(-400.0, 400.0)
+    accelerations.set(
+        xlim=(0.0, 1e3 * duration), ylim=(-400.0, 400.0), xlabel="Time (ms)", ylabel=r"$\ddot q^*$ (rad/s²)"
+    )
     legend(
         figure,
         delays,

@@ -100,8 +100,7 @@ def motion_figure(name: str, *recorded: Recorded) -> Figure:
     errors.set(
         ylabel=r"$E$ (mm)", ylim=(0.0, POSITION_RANGE_MM), yticks=np.linspace(0.0, POSITION_RANGE_MM, 4)
     )
-    alphas.set_ylabel(ALPHA)
-    alphas.set_ylim(bottom=0.0)
+    alphas.set(ylabel=ALPHA, ylim=(0.0, None))
     symbols = dict(SYMBOLS)
     for panel, column in zip(modes, varying, strict=True):
         symbol, meaning, unit, (low, high), step = MODE[column]

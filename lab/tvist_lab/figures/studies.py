@@ -58,8 +58,8 @@ def study_figure(
                 line: {one[by[0]] if by else "": [one[key] for key in keys] for one in mine}
                 for line, mine in lines.items()
             }
-            _dots(panel, list(map(str, places)), [(line, [one.get(each, [None] * 3) for each in places])
-                                                  for line, one in found.items()], both=few)  # fmt: skip
+            rows = [(line, [one.get(each, [None] * 3) for each in places]) for line, one in found.items()]
+            _dots(panel, list(map(str, places)), rows, both=few)
             continue
         for (line, mine), style in zip(lines.items(), cycle(SERIES), strict=False):
             low, middle, high = np.array([[one[key] for key in keys] for one in mine], dtype=float).T
@@ -142,15 +142,19 @@ def robustness_figure(
         return None if None in found else min(found)
 
     for panel, kind in zip(axes, errors, strict=True):
-        _dots(panel, names, [
-            (f"±{100.0 * size:.0f} %",
-             [[worse(kind, one, size, share) for share in ("p5", "median", "median")] for one in delays])
+        shares = ("p5", "median", "median")
+        rows = [
+            (
+                f"±{100.0 * size:.0f} %",
+                [[worse(kind, one, size, share) for share in shares] for one in delays],
+            )
             for size in sizes[kind]
-        ])  # fmt: skip
+        ]
+        _dots(panel, names, rows)
         panel.set(xlabel="Reduction (%)")
         title(panel, f"Wrong {kind}")
-    legend(figure, max(axes, key=lambda panel: len(panel.get_legend_handles_labels()[1])),
-           {"dot": "median, the worse of ±", "bar": "to the 5th percentile"})  # fmt: skip
+    fullest = max(axes, key=lambda panel: len(panel.get_legend_handles_labels()[1]))
+    legend(figure, fullest, {"dot": "median, the worse of ±", "bar": "to the 5th percentile"})
     return figure
 
 
@@ -173,11 +177,11 @@ def residual_by_move_figure(rows: Sequence[Row]) -> Figure:
         (False, FAINT, "x", f"Below {WORTH:g} m/s² unshaped, not counted"),
     ):
         chosen = [row for row in rows if (row["reduction_percent"] is not None) is counts]
-        before, after = ([max(peak, FLOOR) for peak in peaks] for peaks in (
-            [row["unshaped_peak_m_s2"] for row in chosen], [row["shaped_peak_m_s2"] for row in chosen]
-        ))  # fmt: skip
         if chosen:
-            above.plot(before, after, marker, color=color, markersize=3.0, label=label)
+            both = (
+                [max(row[f"{kind}_peak_m_s2"], FLOOR) for row in chosen] for kind in ("unshaped", "shaped")
+            )
+            above.plot(*both, marker, color=color, markersize=3.0, label=label)
     low, high = above.get_xlim()
     for share, words in ((1.0, "as unshaped"), (0.1, "−90 %"), (0.01, "−99 %")):
         above.plot([low, high], [share * low, share * high], color=FAINT, linewidth=0.8)

@@ -66,8 +66,7 @@ def sensitivity_figure(shapers: Sequence[Shaper], zeta: float, errors: Floats) -
         left = 100.0 * residual_over_error(shaper, zeta, errors)
         panel.plot(100.0 * errors, left, **SERIES[place % len(SERIES)].line(label=shaper.name))
     panel.set(xlim=(100.0 * errors[0], 100.0 * errors[-1]), xlabel="Error of the assumed frequency (%)")
-    panel.set_ylabel("Residual vibration (%)")
-    panel.set_ylim(bottom=0.0)
+    panel.set(ylim=(0.0, None), ylabel="Residual vibration (%)")
     title(panel, f"Mode with a damping ratio of {zeta:g}")
     legend(figure, panel)
     return figure

@@ -95,7 +95,7 @@ def arm_of(content: RecordingFile) -> FoxgloveArm:
         raise RecordingError(f"{content.path} holds a robot that cannot be drawn: {error}") from error
     if content.recording.joints != robot.joints:
         raise RecordingError(
-            f"{content.path} holds states of {content.recording.joints} joints, not {robot.joints}"
+            f"{content.path} holds states of {content.recording.joints} joints: must be {robot.joints}"
         )
     links = [link_frame(robot, number) for number in range(robot.joints)]
     bodies = robot.collision.bodies or _sticks(robot, np.array([link.actInv(np.zeros(3)) for link in links]))

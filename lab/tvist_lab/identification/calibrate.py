@@ -200,7 +200,7 @@ def agreeing(
     if len(usable) < MIN_RING_DOWNS:
         why = "; ".join(f"{count}: {reason}" for reason, count in unused(stops).items())
         raise IdentificationError(
-            f"{len(usable)} of {len(stops)} stops can be used, at least {MIN_RING_DOWNS} are needed"
+            f"{len(usable)} of {len(stops)} stops can be used: at least {MIN_RING_DOWNS} are needed"
             + (f" ({why})" if why else "")
             + ". Record motions of the unshaped robot, as by tvist move --shaper none, each with half a second of rest"
         )

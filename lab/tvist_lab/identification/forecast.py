@@ -85,7 +85,7 @@ class ModeForecast:
         return ForecastModes(*np.exp(found), *errors)
 
     def widened(self, left: Sequence[LeftOut]) -> "ModeForecast":
-        """Return the same with errors as large as those found at ring-downs left out of fits."""
+        """Return a forecast whose errors are at least as large as those found at ring-downs left out of fits."""
         squares: list[tuple[float, float]] = []
         for one in left:
             known = self.at(one.ringing.q, one.ringing.payload, MODES)

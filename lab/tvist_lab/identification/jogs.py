@@ -26,7 +26,7 @@ from tvist_controller.api.line import (
     body,
     quickest_motion,
 )
-from tvist_lab.collect import collect
+from tvist_lab.collect import collect, unless_collision
 from tvist_lab.identification.design import LIMITS, choose, free_configurations, jog_of
 from tvist_lab.identification.friction import identify_friction
 from tvist_lab.identification.ring_downs import (
@@ -38,7 +38,6 @@ from tvist_lab.identification.ring_downs import (
     stops_of,
 )
 from tvist_lab.identification.servo_response import ServoResponse, servo_response
-from tvist_lab.identification.travel import unless_collision
 from tvist_lab.identification.unknowns import ArmModes
 from tvist_lab.recordings import Floats, Recording
 from tvist_plant.description import RobotDescription
@@ -239,7 +238,10 @@ async def make_jogs(robot: Robot, control: Arm, plan: JogPlan, progress: Progres
     found = RingDownLogs((), seed=plan.seed)
     try:
         if plan.turned is not None:
-            found = replace(found, servo=await _lag(robot, control, plan, progress))
+            progress("turning the last joint")
+            quick = max((jog.limits for jog in plan.jogs), key=lambda limits: limits.acceleration)
+            turns = [await _recorded(robot, control, q, quick) for q in (plan.turned, plan.at) * TURNS]
+            found = replace(found, servo=servo_response(turns))
         else:
             progress("sweeping for friction")
             places = [jog.q for jog in plan.jogs]
@@ -257,20 +259,16 @@ async def make_jogs(robot: Robot, control: Arm, plan: JogPlan, progress: Progres
     return replace(found, logs=tuple(logs), refused=len(plan.jogs) - len(logs), seconds=seconds)
 
 
-async def _lag(robot: Robot, control: Arm, plan: JogPlan, progress: Progress) -> ServoResponse | None:
-    assert plan.turned is not None, "the plan is that of a robot that takes positions alone"
-    progress("turning the last joint")
-    quick = max((jog.limits for jog in plan.jogs), key=lambda limits: limits.acceleration)
-    return servo_response([await _recorded(robot, control, q, quick) for q in (plan.turned, plan.at) * TURNS])
-
-
 async def _jogs(
     robot: Robot, control: Arm, plan: JogPlan, info: Info, known: RingDownLogs, progress: Progress
 ) -> list[Log]:
     """Return the recordings of all jogs that the robot did not refuse."""
     servo = known.servo
-    told = [one for one in known.friction if one.quantity == "breakaway" and one.status == "identified"]
-    inexact = STICKING if any(one.value > STICKS for one in told) else INEXACT
+    sticks = any(
+        one.quantity == "breakaway" and one.status == "identified" and one.value > STICKS
+        for one in known.friction
+    )
+    inexact = STICKING if sticks else INEXACT
     begins = BEGINS if plan.turned is None else UNKNOWN if servo is None else servo.delay
     driven = () if servo is None else servo.poles
     logs, share, carried = list[Log](), FIRST, None

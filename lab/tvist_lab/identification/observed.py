@@ -68,7 +68,7 @@ def observe(logs: Sequence[Log], payloads: Sequence[Payload]) -> tuple[list[Obse
     for log in logs:
         if "target_q" not in log.recording:
             raise RecordingError(
-                f"{log.name} has no target_q: a twin makes the motions of a log again, from their targets"
+                f"{log.name} has no target_q, from which a twin makes the motions again: record it as well"
             )
         for number, motion in enumerate(motions(log.recording), 1):
             reason = objection(log.recording, motion)

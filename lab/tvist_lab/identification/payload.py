@@ -18,10 +18,9 @@ import pinocchio as pin
 from tvist_client.arm import Arm
 from tvist_client.robot import Robot
 from tvist_controller.api.line import CollisionModel, body, paper_payload
-from tvist_lab.collect import collect
+from tvist_lab.collect import collect, reach, unless_collision
 from tvist_lab.identification.design import most_informative
 from tvist_lab.identification.ring_downs import IdentificationError, Progress, check_model
-from tvist_lab.identification.travel import reach, unless_collision
 from tvist_lab.identification.unknowns import ball, heavier
 from tvist_lab.recordings import Floats, Recording
 from tvist_lab.workspace import workspace
@@ -85,7 +84,7 @@ async def identify_payload(
         torques.append(torque - arm.torque(at, np.zeros_like(at), np.zeros_like(at)))
     if len(rested) < MIN_POSES:
         raise IdentificationError(
-            f"only {len(rested)} of {POSES} poses could be reached, {MIN_POSES} are needed: give the arm more room"
+            f"{len(rested)} of {POSES} poses could be reached, at least {MIN_POSES} are needed: give the arm more room"
         )
     matrix = np.vstack(rows)
     found, deviations = arm.solve(matrix, np.concatenate(torques))

@@ -23,7 +23,7 @@ class ServoResponse:
     """How a robot follows set-points."""
 
     delay: float  # time from a set-point until the measured angle responds [s]
-    lag: float  # t [s]
+    lag: float  # T [s]
     gain: float  # k [1/s²]
     errors: tuple[float, float]  # standard deviations of the logarithms of T and k [-]
 

@@ -38,7 +38,7 @@ class Prediction:
     log: str
     motion: int
     measured: float  # rms of the tool's acceleration from 10 ms to half a second after the stop [m/s²]
-    twin: float  # the same of the twin [m/s²]
+    twin: float  # rms that the twin predicts [m/s²]
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Twin:
     payload: int  # index of the payload that was declared last
     motions: int  # number of motions that were repeated
     others: tuple[RingDownStop, ...]  # motions that were not repeated, with reasons
-    predictions: tuple[Prediction, ...]  # Predictions of motions that the fit has not seen
+    predictions: tuple[Prediction, ...]  # of motions that the fit has not seen
     quiet: int  # number of further unseen motions that vibrate too little to compare
     checked: bool  # whether these motions are from separate logs; else each is left out of the fit in turn
     late_ms: tuple[float, ...]  # delay of another controller's arm after the twin, by motion [ms]

@@ -21,14 +21,14 @@ LARGE = 3  # number of joints from the base, of up to six, with large drives; ea
 TYPICAL_GAIN = (800.0, 300.0)
 """Velocity gain over torque of a large and of a wrist joint, for an arm of about 5 kg payload [s/rad]."""
 UNSURE = 0.7  # standard deviation of a guess's logarithm [-]: within a factor of four with 95 % probability
-SET = 0.2  # the same of a robot file's position gain, which the maker sets and which does not scatter [-]
-ROTOR = 0.2  # the same of rotor inertia, which is nearly proportional to torque for a kind of drive [-]
+SET = 0.2  # deviation of a position gain's logarithm [-]: the maker sets it, and it does not scatter
+ROTOR = 0.2  # deviation of a rotor inertia's logarithm [-]: it is nearly proportional to the drive's torque
 LINK_MASS = 0.03  # relative standard deviation of each link's mass from the description [-]
 PAYLOAD_MASS = 0.04  # deviation of the payload's mass, relative to the rated payload [-]
 SCATTER = 0.12  # relative deviation of a joint from the parameter of its group [-]
 NARROWER = 0.5  # share of the guess's deviation below which a parameter is identified [-]
 FURTHEST = 3.0  # largest deviations of a parameter from the robot file [-]
-STEEL = 7850.0  # Density from which a payload's size is estimated [kg/m³]
+STEEL = 7850.0  # density from which a payload's size is estimated [kg/m³]
 Z_95 = 1.959963984540054  # standard deviations that contain 95 % of a normal variable [-]
 
 

@@ -25,7 +25,7 @@ class WorkspaceMap:
     angles: tuple[Floats, Floats]  # angles of these joints [rad], shapes (R,) and (C,)
     rest: tuple[float, ...]  # configuration of the other joints [rad], with zero for those of the grid
     identified: dict[str, Floats]  # values of the calibration by key of `QUANTITIES`, shape (R, C)
-    true: dict[str, Floats]  # the same for the simulated arm
+    true: dict[str, Floats]  # values of the simulated arm, likewise
     poses: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     """Named poses on the map, by their angles along rows and columns [rad]."""
 

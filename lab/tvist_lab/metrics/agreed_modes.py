@@ -82,9 +82,14 @@ def agreed_modes(alpha: Floats, time: Floats, period: float, begin: float) -> Ri
     rms = float(np.median([rms for _, rms in fits]))
     r_squared = 1.0 - fits[0][1] ** 2 / float(np.mean(whole.cut(LONGEST).alpha ** 2))
     return RingDown(
-        **vars(modes[0]), rms=rms, r_squared=r_squared, window=min(whole.length, LONGEST), modes=len(modes), ok=True,
+        **vars(modes[0]),
+        rms=rms,
+        r_squared=r_squared,
+        window=min(whole.length, LONGEST),
+        modes=len(modes),
+        ok=True,
         found=tuple(modes),
-    )  # fmt: skip
+    )
 
 
 def _fits(ring: Ring) -> Iterator[_Fit]:

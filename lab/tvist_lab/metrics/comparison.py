@@ -8,7 +8,13 @@ import numpy as np
 
 from tvist_lab.metrics.common_clock import peak_after_stop
 from tvist_lab.metrics.motion import MotionRows
-from tvist_lab.metrics.table import IMPACTS, MeasuredRecording, MotionResult, impact_percent
+from tvist_lab.metrics.table import (
+    IMPACTS,
+    MeasuredRecording,
+    MotionResult,
+    impact_percent,
+    reduction_percent,
+)
 from tvist_lab.metrics.vibration import TRUTH, NotMeasurableError
 from tvist_lab.recordings import Floats, Recording
 
@@ -24,17 +30,17 @@ REFERENCE = "reference_q"
 class MotionChange:
     """Vibration of the same motion without and with a shaper; None if not measurable."""
 
-    before: float | None  # largest |α| after the unshaped motion [m/s²]
-    after: float | None  # largest |α| after the shaped one [m/s²]
-    still_before: float | None  # time from the start of the unshaped motion until the tool is at rest [ms]
-    still_after: float | None  # time from the start of the shaped motion until the tool is at rest [ms]
+    before: float | None = None  # largest |α| after the unshaped motion [m/s²]
+    after: float | None = None  # largest |α| after the shaped one [m/s²]
+    still_before: float | None = None  # time from the unshaped motion's start until the tool is at rest [ms]
+    still_after: float | None = None  # time from the shaped motion's start until the tool is at rest [ms]
 
     @property
     def less_percent(self) -> float | None:
         """Reduction of the vibration [%], negative if it grew; None if not defined."""
         if self.before is None or self.after is None or self.before == 0.0:
             return None
-        return 100.0 * (1.0 - self.after / self.before)
+        return reduction_percent(self.before, self.after)
 
     @property
     def gain_ms(self) -> int | None:
@@ -46,8 +52,11 @@ class MotionChange:
     def as_dict(self) -> dict[str, float | None]:
         """Return the numbers that the page of `tvist view` shows."""
         return {
-            "less_percent": self.less_percent, "earlier_ms": self.gain_ms, "before": self.before, "after": self.after,
-        }  # fmt: skip
+            "less_percent": self.less_percent,
+            "earlier_ms": self.gain_ms,
+            "before": self.before,
+            "after": self.after,
+        }
 
     def less(self) -> str:
         """Return the reduction as text."""
@@ -183,8 +192,8 @@ def pairs(measured: MeasuredRecording) -> list[MotionPair]:
     recording, found = measured.recording, measured.motions
     if REFERENCE not in recording:
         return []
-    shapers = [shaper_of(recording, motion, measured.results[place].delay_ms)
-               for place, motion in enumerate(found)]  # fmt: skip
+    delays = [result.delay_ms for result in measured.results]
+    shapers = [shaper_of(recording, *one) for one in zip(found, delays, strict=True)]
     taken: set[tuple[int, str]] = set()
     made = []
     for place, motion in enumerate(found):

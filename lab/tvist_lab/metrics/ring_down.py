@@ -184,9 +184,13 @@ class Ring:
         lower = np.tile([FREQUENCIES[0], DAMPING[0]], count)
         upper = np.tile([self.highest, DAMPING[1]], count)
         fit = least_squares(
-            self.unexplained, start, jac=self._jacobian, bounds=(lower, upper),
-            x_scale=np.tile([1.0, 0.03], count), max_nfev=60,
-        )  # fmt: skip
+            self.unexplained,
+            start,
+            jac=self._jacobian,
+            bounds=(lower, upper),
+            x_scale=np.tile([1.0, 0.03], count),
+            max_nfev=60,
+        )
         return float(fit.cost), np.asarray(fit.x)
 
     def _jacobian(self, parameters: Floats) -> Floats:
@@ -223,14 +227,9 @@ class Ring:
         weights, *_ = np.linalg.lstsq(self.basis(parameters), self.alpha)
         left = self.unexplained(parameters)
         errors = self._standard_errors(parameters, left, weights.size).reshape(-1, 2)
-        modes = [
-            Mode(
-                float(f_d), float(zeta), float(np.linalg.norm(weights[2 * k : 2 * k + 2], ord=2)),
-                float(errors[k, 0]), float(errors[k, 1]),
-            )
-            for k, (f_d, zeta) in enumerate(parameters.reshape(-1, 2))
-        ]  # fmt: skip
-        return modes, left.reshape(self.alpha.shape)
+        sizes = np.linalg.norm(weights[: parameters.size].reshape(len(errors), 2, -1), ord=2, axis=(1, 2))
+        numbers = np.column_stack([parameters.reshape(-1, 2), sizes, errors])
+        return [Mode(*row) for row in numbers.tolist()], left.reshape(self.alpha.shape)
 
     def _judge(self, parameters: Floats) -> RingDown:
         """Return the strongest mode with its standard errors, `ok` if they are small enough."""
@@ -280,7 +279,7 @@ class Ring:
         return np.asarray(np.maximum(innovation / np.abs(1.0 - turns @ filtered) ** 2, 1.0))
 
     def _coloured(self, left: Floats, frequencies: Floats) -> Floats:
-        """Return the same, at least the value from successive samples, which no missing mode hides."""
+        """Return `colour`, but at least what successive samples show: a mode that is not fitted cannot lower that."""
         return np.maximum(self.colour(left, frequencies), widening(left.reshape(self.alpha.shape)) ** 2)
 
     def _score_covariance(self, jacobian: Floats, left: Floats) -> Floats:

@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
+import polars as pl
 
 from tvist_lab.metrics.agreed_modes import agreed_modes, lighter_beside
 from tvist_lab.metrics.common_clock import (
@@ -36,6 +37,7 @@ Row: TypeAlias = dict[str, float | None]
 Table: TypeAlias = dict[str, dict[str, Row]]
 """`unshaped`, `shaped` and `impact_percent` of each motion, structured like `table_2` in the paper's data."""
 T = TypeVar("T")
+Quantity = TypeVar("Quantity", float, pl.Expr)
 
 
 @dataclass(frozen=True)
@@ -231,6 +233,11 @@ def _means(results: Sequence[MotionResult]) -> Row:
         values = [value for result in results if (value := getattr(result, column)) is not None]
         row[column] = float(np.mean(values)) if values else None
     return row
+
+
+def reduction_percent(before: Quantity, after: Quantity) -> Quantity:
+    """Return by how much a number, or each number of a column, is less than before [%]."""
+    return 100.0 * (1.0 - after / before)
 
 
 def impact_percent(unshaped: float | None, shaped: float | None) -> float | None:

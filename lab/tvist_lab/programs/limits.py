@@ -1,11 +1,16 @@
-"""RunLimits of a run, and where bodies must end."""
+"""Limits of a run, and where bodies must end."""
 
 import math
 import re
 from dataclasses import dataclass
 
-UNITS = {"max_shake": "m/s²", "max_seconds": "s", "max_joint_speed": "rad/s", "max_tool_speed": "m/s",
-         "max_force": "N"}  # fmt: skip
+UNITS = {
+    "max_shake": "m/s²",
+    "max_seconds": "s",
+    "max_joint_speed": "rad/s",
+    "max_tool_speed": "m/s",
+    "max_force": "N",
+}
 EXPECTED = re.compile(r"\s*(?P<body>.+?) in (?P<area>.+)")
 
 

@@ -67,9 +67,7 @@ def _in_world(watch: ProgramWatch) -> dict[str, Any]:
     if things is None:
         return {}
     hardest = watch.hardest
-    force = {
-        "force_n": hardest.speed, "timestamp": seconds(hardest.tick), "line": hardest.line or None,
-    }  # fmt: skip
+    force = {"force_n": hardest.speed, "timestamp": seconds(hardest.tick), "line": hardest.line or None}
     poses = zip(things.bodies, watch.plant.places().tolist(), strict=True)
     return {"largest_contact_force": force, "bodies": dict(poses)}
 

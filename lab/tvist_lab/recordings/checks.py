@@ -31,9 +31,7 @@ LONG_GAP = 1.0  # longest gap between rows that is filled with straight lines [s
 Places = tuple[str, Floats]
 """Position of rows in a file: what is counted, such as "line", and the number of each row, shape (T,)."""
 GZIP = b"\x1f\x8b"
-DENSEST = (
-    100  # largest ratio of the content of a packed log to its size; logs reach 30, a malicious file 1000
-)
+DENSEST = 100  # largest ratio of a packed log's content to its size; logs reach 30, a malicious file 1000
 MIN_CONTENT = 1 << 20  # size of the content that any file may have [bytes]
 PERIODS = (1e-4, 0.1)  # shortest and longest time between rows [s]
 
@@ -89,7 +87,7 @@ def check_period(path: Path, period: float) -> None:
     """Refuse times that are not in seconds, or too far apart."""
     if not PERIODS[0] <= period <= PERIODS[1]:
         raise LogError(
-            f"{path}: {TIME} grows by {period:.3g} from row to row; it must be in seconds, and a row come every "
+            f"{path}: {TIME} grows by {period:.3g} from row to row: it must be in seconds, with a row every "
             f"{PERIODS[0]:g} to {PERIODS[1]:g} s"
         )
 
@@ -101,7 +99,7 @@ def check_recording(path: Path, recording: Recording, places: Places | None = No
     joints = max((columns[name].shape[1:] for name in ANGLES if name in columns), default=())
     for name, shape in {TIME: (), "tick": (), **dict.fromkeys(ANGLES, joints or (1,)), **SHAPES}.items():
         if name in columns and ((found := columns[name].shape[1:]) != shape or 0 in shape):
-            raise LogError(f"{path}: column {name} has rows of the shape {found}, not {shape}")
+            raise LogError(f"{path}: column {name} has rows of the shape {found}: must be {shape}")
     if not len(tick) or not np.isfinite(time).all() or not np.array_equal(tick, np.round(np.abs(tick))):
         raise LogError(f"{path}: its rows lack a {TIME}, or the number of their tick")
     check_numbers(path, columns, places or ("tick", tick))
@@ -110,7 +108,10 @@ def check_recording(path: Path, recording: Recording, places: Places | None = No
     step = np.diff(time)
     periods = step / np.diff(tick)
     if (back := np.flatnonzero(step <= 0.0)).size:
-        raise LogError(f"{path}, tick {tick[back[0] + 1]:.0f}: {TIME} does not go on")
+        before, after = time[back[0] : back[0] + 2]
+        raise LogError(
+            f"{path}, tick {tick[back[0] + 1]:.0f}: {TIME} is {after:.6g} s after {before:.6g} s: must increase"
+        )
     # The clock of another controller may not be in step with its ticks.
     for period in (np.median(periods), recording.period, *([] if recording.foreign else [np.max(periods)])):
         check_period(path, float(period))

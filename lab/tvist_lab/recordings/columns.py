@@ -18,7 +18,7 @@ SHORT = {
     "gyroscope": GYROSCOPE,
     "pose": "actual_TCP_pose",
 }  # RTDE's names of the most important columns, by short name
-AXES = {"x": 0, "y": 1, "z": 2}  # Letters that may replace the number in the name of a vector's column
+AXES = {"x": 0, "y": 1, "z": 2}  # letters that may replace the number in the name of a vector's column
 SI = {
     "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "rad": 1.0, "deg": np.pi / 180.0, "m/s2": 1.0, "mm/s2": 1e-3,
     "g": 9.80665, "mg": 9.80665e-3, "rad/s": 1.0, "deg/s": np.pi / 180.0,
@@ -145,9 +145,7 @@ def _places(path: Path, key: str, pattern: str, header: Sequence[str]) -> list[i
         first, last = int(span[1]), int(span[2] or span[1])
         if 1 <= first <= last <= len(header):
             return list(range(first - 1, last))
-        raise LogError(
-            f"{path}: {key}={pattern} are no columns: they are 1 to {len(header)}, as in {key}=2-7"
-        )
+        raise LogError(f"{path}: {key}={pattern} are no columns: must be 1 to {len(header)}, as in {key}=2-7")
     if not hits:
         raise LogError(f"{path} has no column {quoted(pattern)} for {key}; {found_columns(header)}")
     hits.sort(key=lambda hit: int(AXES.get(hit[1][1], hit[1][1])) if braces else 0)

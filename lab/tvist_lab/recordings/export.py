@@ -69,10 +69,6 @@ def _exact(values: Floats) -> bool:
     )
 
 
-def _write_csv(recording: Recording, stream: IO[bytes]) -> None:
-    flat(recording).with_columns(pl.col(pl.Float64).fill_nan(None)).write_csv(stream)
-
-
 def _write_parquet(recording: Recording, stream: IO[bytes]) -> None:
     table = io.BytesIO()  # from a stream that fails, polars makes an error that does not say why
     flat(recording).write_parquet(table, metadata={KEY: describe(recording).decode()})
@@ -109,5 +105,10 @@ def _reason(error: Exception) -> str:
     return getattr(error, "strerror", None) or (found[1] if found else str(error))
 
 
-FORMATS: dict[str, Callable[[Recording, IO[bytes]], None]] = {"csv": _write_csv, "parquet": _write_parquet}
+FORMATS: dict[str, Callable[[Recording, IO[bytes]], None]] = {
+    "csv": lambda recording, to: (
+        flat(recording).with_columns(pl.col(pl.Float64).fill_nan(None)).write_csv(to)
+    ),
+    "parquet": _write_parquet,
+}
 """Function that writes each format; a file's ending is the format's name."""

@@ -91,7 +91,7 @@ class RecordingFile:
         except (*DAMAGE, ProtocolError):  # up to there it was read the first time
             pass
         if left > 0:
-            raise RecordingFileError(f"{self.path} has changed since it was read")
+            raise RecordingFileError(f"{self.path} has changed since it was read: read it again")
 
 
 def read(path: str | os.PathLike[str]) -> RecordingFile:
@@ -202,7 +202,7 @@ class _Content:
                 if name == END_METADATA:
                     self.ends.append(content)
                 if name == METADATA and content.get("format") != FORMAT:
-                    raise self._error(f"has format {content.get('format')}; {FORMAT} can be read")
+                    raise self._error(f"has format {content.get('format')}: must be {FORMAT}")
 
     def _decode(self) -> None:
         waiting, self.waiting = self.waiting, []

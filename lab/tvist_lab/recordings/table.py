@@ -165,7 +165,7 @@ def _check_header(table: LogTable, header: Sequence[str], names: Sequence[str], 
         )
     checks.check_names(there, header)
     if twice := sorted(name for name, count in Counter(header).items() if name and count > 1):
-        raise LogError(f"{there}: the column {twice[0]} is there twice")
+        raise LogError(f"{there}: the column {twice[0]} is there twice: rename one")
 
 
 def _lacking(table: LogTable, found: Mapping[str, Floats], needs: Needs) -> LogError:

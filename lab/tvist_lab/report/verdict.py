@@ -20,7 +20,7 @@ LESS, EARLIER = ("less", "more"), ("earlier", "later")  # words for positive and
 class Shaping:
     """Whether the reference of a recording was shaped, if known."""
 
-    shaped: bool | None  # none if the recording has no reference before shaping
+    shaped: bool | None  # None if the recording has no reference before shaping
     sentence: str
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import polars as pl
 
+from tvist_lab.metrics.table import reduction_percent
 from tvist_lab.recordings import Floats
 from tvist_lab.studies.causality import inspect
 from tvist_lab.study.arms import ARMS
@@ -119,7 +120,7 @@ def _beside_waiting(rows: pl.DataFrame) -> pl.DataFrame:
     before = waited("residual_m_s2")
     return rows.with_columns(
         time_ms=pl.when(pl.col("status") == MEASURED).then(pl.col("time_until_still_ms").fill_null(math.inf)),
-        less_percent=100.0 * (1.0 - pl.col("residual_m_s2") / pl.when(before >= WORTH).then(before)),
+        less_percent=reduction_percent(pl.when(before >= WORTH).then(before), pl.col("residual_m_s2")),
         moving=pl.col("in_motion_m_s2") / waited("in_motion_m_s2"),
     )
 

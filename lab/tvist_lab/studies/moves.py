@@ -6,7 +6,6 @@ from typing import Any
 import polars as pl
 
 from tvist_lab.phrases import QUANTILES_FROM, either, sample, spread
-from tvist_lab.study.arms import AS_DESCRIBED
 from tvist_lab.study.columns import Column, ResultTable, highest, lowest, median, p5, p90, share
 from tvist_lab.study.held_out import interval_of
 from tvist_lab.study.measures import WORTH
@@ -14,6 +13,7 @@ from tvist_lab.study.method import WaitingMethod
 from tvist_lab.study.request import Preset, StudyRequest
 from tvist_lab.study.study import Figures, Result, Study
 from tvist_lab.study.work import MEASURED, record
+from tvist_plant.variants import AS_DESCRIBED
 
 COUNTED = pl.col("reduction_percent").is_not_null()  # selects rows with enough vibration for a percentage
 LESS = "Reduction of the largest acceleration of the tool, later than 10 ms after the reference stops."

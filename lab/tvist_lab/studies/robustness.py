@@ -5,14 +5,15 @@ from typing import Any
 
 import polars as pl
 
-from tvist_lab.study.arms import AS_DESCRIBED, PERTURBED, with_springs
+from tvist_lab.metrics.table import reduction_percent
+from tvist_lab.study.arms import PERTURBED
 from tvist_lab.study.case import Case
 from tvist_lab.study.columns import Column, ResultTable, across, median, p5
 from tvist_lab.study.held_out import MIN_MOVES, interval_of
 from tvist_lab.study.measures import QUIET_LEVEL
 from tvist_lab.study.request import Preset, StudyRequest
 from tvist_lab.study.study import Figures, Result, Study
-from tvist_plant.variants import Variant, variant
+from tvist_plant.variants import AS_DESCRIBED, Variant, variant, with_springs
 
 ERRORS: dict[str, tuple[float, ...]] = {
     "stiffness": (-0.3, -0.2, -0.1, -0.05, 0.0, 0.05, 0.1, 0.2, 0.3),
@@ -25,7 +26,7 @@ LESS = Column("median", median("reduction_percent"), 1)
 WORST = Column("p5", p5("reduction_percent", MIN_MOVES), 1)
 BOTH = Column("median / p5", lambda one: f"{LESS.text(one)} / {WORST.text(one)}")
 DELAY = Column("delay ms", median("delay_ms"), 0)
-BEYOND = 100.0 * (1.0 - pl.col("shaped_peak_m_s2") / pl.col("waited_peak_m_s2"))
+BEYOND = reduction_percent(pl.col("waited_peak_m_s2"), pl.col("shaped_peak_m_s2"))
 """Reduction compared with waiting."""
 WAITED = pl.col("reduction_percent").is_not_null() & (pl.col("waited_peak_m_s2") >= QUIET_LEVEL)
 

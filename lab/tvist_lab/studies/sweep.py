@@ -18,7 +18,6 @@ import msgspec
 from msgspec import Meta, Struct
 
 from tvist_lab.studies.moves import COLUMNS, SUMMED
-from tvist_lab.study.arms import scattered
 from tvist_lab.study.case import LIMITS, Case, arm_seed
 from tvist_lab.study.columns import Column, ResultTable, highest
 from tvist_lab.study.method import Named
@@ -27,6 +26,7 @@ from tvist_lab.study.recipes import Recipe
 from tvist_lab.study.study import Figures, Result, Study
 from tvist_plant.description import RobotDescription
 from tvist_plant.user_file import UserFileError, read_text, read_toml
+from tvist_plant.variants import scattered
 from tvist_protocol.content import checked
 from tvist_protocol.errors import ProtocolError, quoted
 from tvist_protocol.values import Mass

@@ -2,18 +2,8 @@
 
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.plant import SimulatedArm
-from tvist_plant.variants import AS_DESCRIBED, VARIANTS, Variant, scattered, stiffer, with_springs
+from tvist_plant.variants import VARIANTS, Variant
 from tvist_plant.world.mujoco_arm import MujocoArm
-
-__all__ = [
-    "ARMS",
-    "AS_DESCRIBED",
-    "JUDGED",
-    "PERTURBED",
-    "scattered",
-    "stiffer",
-    "with_springs",
-]
 
 PERTURBED = ("stribeck", "hysteresis", "torsion", "base", "backlash", "combined")
 """Plants for judging robustness, besides wrong springs and payloads."""

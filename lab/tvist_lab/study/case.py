@@ -8,12 +8,11 @@ import numpy as np
 
 from tvist_controller.api.line import InverseDynamics, MotionLimits, body, central_differences, paper_payload
 from tvist_lab.recordings import Floats
-from tvist_lab.study.arms import AS_DESCRIBED
 from tvist_lab.study.line import PAPER, point_to_point
 from tvist_lab.study.method import Method
 from tvist_lab.study.moves import Move, stopped_stream
 from tvist_plant.description import RobotDescription
-from tvist_plant.variants import Variant
+from tvist_plant.variants import AS_DESCRIBED, Variant
 
 LIMITS = {"gentle": PAPER, "industrial": MotionLimits(velocity=3.0, acceleration=8.0, jerk=2000.0)}
 """Limits of moves by name: the paper's, and those of quick handling."""

@@ -23,6 +23,7 @@ from tvist_lab.metrics import (
     still_after,
 )
 from tvist_lab.metrics.common_clock import AFTER_STOP, STILL, Kinematics, peak_later_than
+from tvist_lab.metrics.table import reduction_percent
 from tvist_lab.recordings import Floats, Recording
 from tvist_lab.study.case import Case
 from tvist_lab.study.shaping import Shaped
@@ -126,10 +127,6 @@ def _ms(seconds: float | None) -> float | None:
     return None if seconds is None else round(1e3 * seconds, 6)
 
 
-def _less(peak: float, before: float) -> float:
-    return 100.0 * (1.0 - peak / before)
-
-
 def _largest(q: Floats, order: int) -> float:
     return float(np.abs(np.diff(q, order, axis=0) / PERIOD**order).max())
 
@@ -149,11 +146,11 @@ _ALL = (
     ),
     Measure(
         "reduction_percent", "%", "reduction of the peak; null if the unshaped peak is below 0.2 m/s²",
-        lambda motion: _less(motion.peak, motion.unshaped.peak) if motion.counts else None,
+        lambda motion: reduction_percent(motion.unshaped.peak, motion.peak) if motion.counts else None,
     ),
     Measure(
         "less_than_waiting_percent", "%", "the same, compared with waiting until the shaped stop",
-        lambda motion: _less(motion.peak, motion.waited) if motion.counts else None,
+        lambda motion: reduction_percent(motion.waited, motion.peak) if motion.counts else None,
     ),
     Measure(
         "delay_ms", "ms", "how much later the shaped reference ends",

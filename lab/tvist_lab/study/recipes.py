@@ -111,7 +111,8 @@ class Recipe:
             raise RecipeError(f"shaper {self.shaper} needs a calibration")
         if known.robot != description.robot.model:
             raise RecipeError(
-                f"calibration {known.name} is for a {known.robot}, but this arm is a {description.robot.model}"
+                f"calibration {known.name} is for a {known.robot}, but this arm is a {description.robot.model}: "
+                "give one of this arm"
             )
         source = ModeSource("polynomial" if known.modal is None else "modal", description, known)
         if modes > source.most:

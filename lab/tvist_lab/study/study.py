@@ -229,14 +229,14 @@ def _kind_of(name: str, cases: Iterable[Case]) -> Any:
         kinds = {float}
     if len(kinds) > 1:
         raise StudyError(
-            f"axis {name!r} has values of the types {', '.join(sorted(kind.__name__ for kind in kinds))}"
+            f"axis {name!r} has values of the types {', '.join(sorted(kind.__name__ for kind in kinds))}: must be one"
         )
     return KINDS.get(kinds.pop(), pl.String)
 
 
 def _check_alone(names: Sequence[str], what: str) -> None:
     if len(set(names)) < len(names):
-        raise StudyError(f"{what} have the same name: {', '.join(names)}")
+        raise StudyError(f"{what} have the same name: {', '.join(names)}: must differ")
 
 
 def read_study(path: Path) -> Study:

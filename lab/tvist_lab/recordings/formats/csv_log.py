@@ -13,7 +13,7 @@ from tvist_lab.recordings.description import beside
 from tvist_lab.recordings.recording import Floats
 from tvist_lab.recordings.table import STRANGE, TEXT, LogTable, reader
 
-SEPARATORS = (";", "\t", ",", " ")  # Separators of cells, in the order in which they are sought in the header
+SEPARATORS = (";", "\t", ",", " ")  # separators of cells, in the order in which they are sought in the header
 EMPTY = ("", "nan", "NaN", "NAN", "None", "null", "NULL", "NA", "-")  # cells without a number
 _NUMBER = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?")
 

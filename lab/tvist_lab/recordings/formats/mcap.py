@@ -20,10 +20,12 @@ from tvist_lab.recordings.recording import Floats, Recording
 from tvist_lab.recordings.table import LogTable, reader
 from tvist_protocol.errors import quoted
 
-READ = {f"{package}/msg/{name}": name for package, name in (
-    ("sensor_msgs", "JointState"), ("sensor_msgs", "Imu"), ("control_msgs", "JointTrajectoryControllerState"),
-    ("geometry_msgs", "PoseStamped"),
-)}  # fmt: skip
+READ = {
+    "sensor_msgs/msg/JointState": "JointState",
+    "sensor_msgs/msg/Imu": "Imu",
+    "control_msgs/msg/JointTrajectoryControllerState": "JointTrajectoryControllerState",
+    "geometry_msgs/msg/PoseStamped": "PoseStamped",
+}
 """Message types that are read, and their short names."""
 ROWS = ("Imu", "JointState", "JointTrajectoryControllerState")  # types that can give the rows, the best first
 ORDER = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
@@ -97,9 +99,8 @@ def read_rosbag(path: Path) -> LogTable:
     names = [TIME, *(f"{name}_{at}" for name, values in columns.items() for at in range(values.shape[1]))]
     order = np.argsort(times, kind="stable")
     table = np.column_stack([times, *columns.values()])[order]
-    return LogTable(
-        path, names, table, order + np.float64(1.0), "message", notes=tuple(notes), rtde=True, there=there
-    )  # fmt: skip
+    places = order + np.float64(1.0)
+    return LogTable(path, names, table, places, "message", notes=tuple(notes), rtde=True, there=there)
 
 
 def has_ros(path: Path) -> bool:
@@ -152,8 +153,8 @@ def _decoder(
         raise LogError(f"{path}: the schema of {channel.topic} is damaged: {quoted(error)}") from error
     if decode is None:
         raise LogError(
-            f"{path}: {channel.topic} is written as {channel.message_encoding} with a schema in {schema.encoding}; "
-            "cdr with ros2msg is read"
+            f"{path}: {channel.topic} is written as {channel.message_encoding} with a schema in {schema.encoding}: "
+            "must be cdr with ros2msg"
         )
     return decode
 
@@ -202,7 +203,7 @@ def _xyz(vector: Any) -> list[float]:
 def _joints(topic: _Topic, names: list[str], columns: dict[str, Any]) -> dict[str, list[float]]:
     """Sort values of columns with one entry per joint in the order of the joints."""
     if len(names) > MOST_JOINTS:
-        raise ValueError(f"{len(names)} joints, at most {MOST_JOINTS} are read")
+        raise ValueError(f"it has {len(names)} joints: must be at most {MOST_JOINTS}")
     topic.joints = topic.joints or tuple(sorted(names, key=_place))
     row = {}
     for column, values in columns.items():

@@ -56,7 +56,7 @@ def _first(path: Path, data: bytes) -> tuple[int, int]:
             if at + size == len(data) or data[at + size : at + size + 4] == head[: len(data) - at - size]:
                 if size == OLD:
                     raise LogError(
-                        f"{path} is a dump of software 1.8 (packets of {OLD} bytes); 3.0 and later are read"
+                        f"{path} is a dump of software 1.8 (packets of {OLD} bytes): must be of 3.0 or later"
                     )
                 return at, size
             at = data.find(head, at + 1)

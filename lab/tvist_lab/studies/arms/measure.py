@@ -14,7 +14,6 @@ from tvist_lab.identification.design import free_configurations
 from tvist_lab.identification.jogs import make_jogs, plan_jogs
 from tvist_lab.in_process import robot_in_process
 from tvist_lab.studies.moves import study
-from tvist_lab.study.arms import stiffer
 from tvist_lab.study.catalogue import some
 from tvist_lab.study.engine import run
 from tvist_lab.study.moves import draw_moves
@@ -23,6 +22,7 @@ from tvist_plant.description import RobotDescription
 from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.model import rigid_model
+from tvist_plant.variants import stiffer
 from tvist_protocol.calibration import Calibration
 
 PLACES = 40  # number of random configurations at which the sag is compared

@@ -7,6 +7,7 @@ import numpy as np
 
 from tvist_lab.metrics import table_2 as table_2_of
 from tvist_lab.metrics import table_notes
+from tvist_lab.metrics.comparison import MotionChange
 from tvist_lab.studies.paper.experiment import ACCELERATION, Experiment, JudgedRun
 from tvist_lab.studies.paper.published import MOTIONS, published
 from tvist_lab.study.columns import Column, cells
@@ -85,9 +86,9 @@ def _row(judged: list[JudgedRun], unshaped: list[JudgedRun]) -> dict[str, float 
     return {
         "delay_ms": 1e3 * float(np.mean(started) - np.mean(started_before)),
         "residual_vibration_m_s2": residual,
-        "residual_vibration_reduction_percent": _reduction(residual, before),
+        "residual_vibration_reduction_percent": MotionChange(before, residual).less_percent,
         "peak_m_s2": peak,
-        "peak_reduction_percent": _reduction(peak, peak_before),
+        "peak_reduction_percent": MotionChange(peak_before, peak).less_percent,
         "still_after_ms": _mean([one.result.still_after_ms for one in judged]),
         "peak_acceleration_ratio": max(one.result.peak_acceleration_rad_s2 or 0.0 for one in judged)
         / ACCELERATION,
@@ -98,12 +99,6 @@ def _mean(values: list[float | None]) -> float | None:
     """Return the mean; None if one value is not measurable, since the mean of the rest would be biased."""
     known = [value for value in values if value is not None]
     return float(np.mean(known)) if known and len(known) == len(values) else None
-
-
-def _reduction(after: float | None, before: float | None) -> float | None:
-    if after is None or before is None or before == 0.0:
-        return None
-    return 100.0 * (1.0 - after / before)
 
 
 def origins(robot: str, result: Mapping[str, Any]) -> list[dict[str, str]]:
