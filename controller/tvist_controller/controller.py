@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any
 
 from tvist_controller.dispatch.planner import Planner
-from tvist_controller.dispatch.rights import NoControlError, is_holders
+from tvist_controller.dispatch.rights import is_holders
 from tvist_controller.dispatch.robot import RobotParts
 from tvist_controller.dispatch.table import COMMANDS, HARMLESS
 from tvist_controller.instruments.report import TRUE_MODES_EVERY, Report, true_modes, truth_message
@@ -71,7 +71,7 @@ class Controller(RobotParts):
             if row.lease == "needed" or (row.lease == "if named" and token is not None):
                 self.session.renew(token, self.now)
             reply = self.carry_out(command, plan, session, origin)
-        except (RefusalError, NoControlError) as refusal:
+        except RefusalError as refusal:
             self.counters.refused += 1
             return refusal.reply
         except PlantError as error:
@@ -87,7 +87,7 @@ class Controller(RobotParts):
         session: str | None = None,
         origin: str | None = None,
     ) -> Reply | None:
-        """Carry out a command; return None for the reply `Done`; raise RefusalError or NoControlError."""
+        """Carry out a command; return None for the reply `Done`; raise RefusalError."""
         if self.watching is not None and type(command) not in HARMLESS:
             raise wrong_mode(REFUSED)
         if self.supervision is not None:

@@ -140,8 +140,7 @@ class Host:
             self._learn(learning)
         controller.begin_tick()
         news = self._carry_out_orders()
-        io = controller.changed_io()
-        if io is not None:
+        if (io := controller.changed_io()) is not None:
             for sink in self._sinks:
                 sink.io(io)
         report, events = controller.complete_tick()
@@ -202,8 +201,7 @@ class Host:
 
     def leave_arm(self) -> None:
         """Power off an arm that nobody controls any more."""
-        power = self.controller.motion.power
-        if power is not None:
+        if (power := self.controller.motion.power) is not None:
             power.end()
             self.tell_raised()
 
@@ -273,8 +271,7 @@ class Host:
                     controller.session.clock, controller.session.lease, step.token
                 ):
                     break
-                setpoint = next(setpoints, None)
-                if setpoint is not None:
+                if (setpoint := next(setpoints, None)) is not None:
                     played = Setpoint(token=motion_token, sequence=setpoint.sequence, q=setpoint.q)
                     self.receive_setpoint(played)
                 self.tick()

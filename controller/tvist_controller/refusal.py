@@ -107,8 +107,7 @@ def _check_limit(code: Code, name: str, value: float, highest: float, unit: str,
 
 def _check_least(name: str, value: float, unit: str, prefix: str) -> None:
     if value < (lowest := SLOWEST[name]):
-        must = f"at least {lowest:g} {unit}"
-        raise invalid(f"{prefix}{name}", f"{value:g} {unit}", must, lowest)
+        raise invalid(f"{prefix}{name}", f"{value:g} {unit}", f"at least {lowest:g} {unit}", lowest)
 
 
 def check_body(payload: Payload, where: str = "", rated: float = math.inf) -> None:

@@ -100,8 +100,8 @@ def _collision(description: RobotDescription) -> Iterator[str]:
     """Check that collision bodies belong to existing links and pairs to existing bodies."""
     names = [body.name for body in description.collision.bodies]
     known = {*names, "payload"}
-    if len(known) <= len(names):
-        yield f"collision.bodies has the names {names}: must all differ, also from payload"
+    if len({*known, "floor"}) < len(names) + 2:
+        yield f"collision.bodies has names {names}: all must differ, also from payload and floor"
     for body in description.collision.bodies:
         if body.link >= description.joints:
             yield (f"collision.bodies: {body.name} has link {body.link}: must be below {description.joints}")

@@ -62,11 +62,12 @@ def pressed(robot, plant, ticks):
 
 
 def places(robot):
+    """Return the tool's positions before shaping, one per tick [m]."""
     return np.array([KINEMATICS.pose(np.array(state.reference_q))[1] for state in robot.states])
 
 
 def protective(robot):
-    return [event.why for event in robot.events if event.kind == "protective_stop"]
+    return [event.why for event in robot.told("protective_stop")]
 
 
 def force_mode(robot, compliant=Z, wrench=(0.0,) * 6, **fields):

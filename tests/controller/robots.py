@@ -197,6 +197,12 @@ class Robot:
     def kinds(self):
         return [event.kind for event in self.events]
 
+    def told(self, kind):
+        return [event for event in self.events if event.kind == kind]
+
+    def warnings(self):
+        return [event.why for event in self.told("warning")]
+
     def column(self, name):
         return np.array([getattr(state, name) for state in self.states])
 

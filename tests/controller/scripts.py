@@ -44,10 +44,10 @@ def run(robot: Robot, *lines: str) -> Robot:
 
 def said(robot: Robot) -> list[str]:
     """Return the texts that programs have written."""
-    return [event.why for event in robot.events if event.kind == "text"]
+    return [event.why for event in robot.told("text")]
 
 
 def failure(robot: Robot):
     """Return the event of the error that ended a program, or None."""
-    found = [event for event in robot.events if event.kind == "warning" and event.line is not None]
+    found = [event for event in robot.told("warning") if event.line is not None]
     return found[-1] if found else None

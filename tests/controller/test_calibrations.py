@@ -28,7 +28,7 @@ RENAMED = REPLACE(
 
 def warnings(robot):
     robot.tick()
-    return [event.why for event in robot.events if event.kind == "warning"]
+    return robot.warnings()
 
 
 @pytest.mark.parametrize("name", available())

@@ -32,10 +32,6 @@ def carried(robot):
     return robot.controller.cycle.plant.payload
 
 
-def warnings(robot):
-    return [event.why for event in robot.events if event.kind == "warning"]
-
-
 class TestWires:
     @given(st.lists(st.booleans(), max_size=200), st.integers(0, 30), st.booleans())
     def test_a_wired_input_equals_its_output_delayed_even_for_short_pulses(self, signal, ticks, inverted):
@@ -157,7 +153,7 @@ class TestParts:
         robot = in_cell(part(away))
         run(robot, "rq_close_and_wait()", "textmsg(rq_is_object_detected(), rq_current_pos())")
         assert said(robot) == [f"False{CLOSED}"]
-        assert any(re.search(said_, why) for why in warnings(robot))
+        assert any(re.search(said_, why) for why in robot.warnings())
         assert carried(robot).mass == TOOL["mass"]
 
     def test_a_reset_restores_the_initial_cell(self):

@@ -139,7 +139,7 @@ def test_a_stream_is_stopped_if_its_filtered_end_would_collide(shaper):
     assert robot.controller.motion.streaming
     assert robot.send(c.ServoStop) == Done()
     robot.until_rest()
-    ended = [event for event in robot.events if event.kind == "stream_stopped"]
+    ended = robot.told("stream_stopped")
     assert [event.code for event in ended] == ["collision"]
     assert "through the filter" in ended[0].why
     model = robot.controller.motion.collisions

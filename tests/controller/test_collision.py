@@ -1,6 +1,7 @@
 """Collisions of the arm with itself and the floor."""
 
 import itertools
+from importlib import resources
 
 import numpy as np
 import pinocchio as pin
@@ -9,7 +10,7 @@ import pytest
 from tvist_controller.foresight.collision import CLEARANCE, CollisionModel
 from tvist_controller.trajectory import JointLine
 from tvist_lab.workspace import WORKSPACE
-from tvist_plant.description import Payload, load
+from tvist_plant.description import DescriptionError, Payload, load
 from tvist_plant.model import link_frame, rigid_model
 from tvist_protocol import commands as c
 from tvist_protocol.replies import Accepted, Done, Refused
@@ -94,8 +95,7 @@ def test_a_path_found_free_is_free_in_small_steps(model):
     assert free > 20
 
 
-def test_a_colliding_move_is_refused_with_bodies_and_time():
-    robot = Robot()
+def test_a_colliding_move_is_refused_with_bodies_and_time(robot):
     reply = robot.send(c.MoveJ, q=tuple(DOWN))
     assert isinstance(reply, Refused)
     assert reply.code == "collision"
@@ -154,6 +154,14 @@ def test_a_reset_into_a_collision_is_refused_with_posture_and_bodies(name, paylo
             assert part in reply.why
         assert (robot.controller.cycle.position == before).all()
     assert 1 < refused < 39
+
+
+@pytest.mark.parametrize("name", ["payload", "floor"])
+def test_no_body_of_a_robot_file_is_called_like_payload_or_floor(name, tmp_path):
+    text = (resources.files("tvist_plant") / "robots" / "ur5e.toml").read_text(encoding="utf-8")
+    (tmp_path / "arm.toml").write_text(text.replace('name = "flange"', f'name = "{name}"'), encoding="utf-8")
+    with pytest.raises(DescriptionError, match="all must differ, also from payload and floor"):
+        load(tmp_path / "arm.toml")
 
 
 def test_a_robot_cannot_start_in_a_collision():

@@ -29,8 +29,7 @@ def moving(robot: Robot, ticks: int = 200) -> int:
     return accepted.id
 
 
-def test_a_move_is_accepted_started_and_done():
-    robot = Robot()
+def test_a_move_is_accepted_started_and_done(robot):
     assert robot.send(c.MoveJ, q=Q2_) == Accepted(id=1)
     robot.tick()
     assert [(e.kind, e.id, e.tick) for e in robot.events] == [("motion_started", 1, 1)]
@@ -40,8 +39,7 @@ def test_a_move_is_accepted_started_and_done():
     assert last.reference_q == list(Q2_)
 
 
-def test_a_stream_is_followed_and_stopped():
-    robot = Robot()
+def test_a_stream_is_followed_and_stopped(robot):
     robot.stream(300)
     assert robot.states[-1].setpoint_sequence == 299
     assert robot.column("reference_q")[-1] == pytest.approx(Q1 + 0.1 * (1 - np.cos(3.0 * 299 * H)), abs=0)
@@ -52,8 +50,7 @@ def test_a_stream_is_followed_and_stopped():
     assert robot.send(c.MoveJ, q=Q1_) == Accepted(id=1)
 
 
-def test_a_stop_reports_a_limited_deceleration():
-    robot = Robot()
+def test_a_stop_reports_a_limited_deceleration(robot):
     moving(robot)
     robot.send(c.Stop, deceleration=1e5)
     robot.tick()
@@ -75,8 +72,7 @@ def test_a_stop_at_rest_changes_nothing():
     assert robot.events == []
 
 
-def test_choosing_an_estimator_emits_an_event():
-    robot = Robot()
+def test_choosing_an_estimator_emits_an_event(robot):
     assert robot.send(c.SetEstimator, name="fixed", f_d=(6.7,), zeta=(0.34,)) == Done()
     state = robot.tick()
     assert (state.estimated_f_d, state.estimated_zeta) == ([6.7], [0.34])
@@ -87,8 +83,7 @@ def test_choosing_an_estimator_emits_an_event():
     assert robot.controller.assumed.source.name == "polynomial"
 
 
-def test_declaring_a_payload_does_not_change_the_carried_one():
-    robot = Robot()
+def test_declaring_a_payload_does_not_change_the_carried_one(robot):
     moments = robot.tick().target_moment
     assert robot.send(c.SetPayload, mass=1.0, com=DISC.com, inertia=DISC.inertia) == Done()
     assert abs(robot.tick().target_moment[1]) < abs(moments[1])
@@ -148,8 +143,7 @@ def test_an_expired_lease_stops_a_moving_arm():
     assert robot.send(c.TakeControl, client="b").token
 
 
-def test_missed_ticks_are_published():
-    robot = Robot()
+def test_missed_ticks_are_published(robot):
     robot.controller.counters.missed_ticks += 3
     assert robot.tick().missed_ticks == 3
 
@@ -195,8 +189,7 @@ def test_an_invalid_setup_raises_value_error():
             Controller(setup(**wrong))
 
 
-def test_the_state_before_the_first_tick_is_the_arm_at_rest_at_its_start():
-    robot = Robot()
+def test_the_state_before_the_first_tick_is_the_arm_at_rest_at_its_start(robot):
     first = robot.controller.latest
     assert (first.tick, first.timestamp) == (0, 0.0)
     assert first.reference_q == first.target_q == list(UR5E.poses["Q1"])

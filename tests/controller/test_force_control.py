@@ -70,13 +70,13 @@ def test_zeroing_subtracts_an_offset_in_the_sensor_frame():
 
 
 def test_in_free_air_the_tool_moves_along_the_wanted_force_only():
-    """With the values of ROS 2's test, 10 N moves the tool by over 3 cm in 5 s, and other axes by less than 1 mm."""
+    """With the values of ROS 2's test, 10 N moves the tool by over 6 mm/s, and no other axis."""
     robot, _ = touching(0.0)
     assert force_mode(robot, wrench=(0.0, 0.0, 10.0, 0.0, 0.0, 0.0), damping=0.1, gain=0.8) == Accepted(id=1)
     begun = np.array(robot.tick(1).actual_TCP_pose)
-    moved = np.array(robot.tick(2500).actual_TCP_pose) - begun
-    assert moved[2] > 0.03
-    assert np.abs(moved[[0, 1, 3, 4, 5]]).max() < 1e-3
+    moved = np.array(robot.tick(1000).actual_TCP_pose) - begun
+    assert moved[2] > 0.012
+    assert np.abs(moved[[0, 1, 3, 4, 5]]).max() < 4e-4
     assert robot.send(f.EndForceMode) == Done()
     robot.until_rest()
     assert robot.kinds().count("motion_stopped") == 1
@@ -142,7 +142,7 @@ def test_an_excessive_force_causes_a_protective_stop():
     robot.tick(5)
     assert "protective_stop" not in robot.kinds()
     robot.tick(5)
-    (event,) = [event for event in robot.events if event.kind == "protective_stop"]
+    (event,) = robot.told("protective_stop")
     assert event.code == "limit_force"
     assert "above 250 N" in event.why
 
@@ -152,7 +152,7 @@ def test_a_path_deviation_in_force_mode_causes_a_stop_that_names_the_axis():
     force_mode(robot, limits=(0.1, 1e-4, 0.1, 0.5, 0.5, 0.5))
     plant.pushed = np.array([0.0, 60.0, 0.0])
     robot.tick(100)
-    (event,) = [event for event in robot.events if event.kind == "protective_stop"]
+    (event,) = robot.told("protective_stop")
     assert event.code == "limit_force"
     assert "axis 1 of force mode" in event.why
     assert "limits[1] is 0.0001" in event.why
@@ -192,8 +192,10 @@ def test_freedrive_does_not_pass_a_singular_posture():
     start(robot, "freedrive_mode()", "while True:", "write_output_integer_register(0, get_freedrive_status())",
           "sync()", "end")  # fmt: skip
     plant.pushed[:3] = 0.0, -60.0, 20.0
-    robot.tick(3000)
-    assert robot.controller.io().output_int_register[0] > 0
+    while robot.controller.io().output_int_register[0] == 0:
+        robot.tick(100)
+        assert len(robot.states) < 3000
+    robot.tick(300)
     assert playing(robot)
     assert "protective_stop" not in robot.kinds()
 

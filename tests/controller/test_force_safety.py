@@ -70,10 +70,10 @@ def test_force_mode_ends_when_an_external_sensor_is_silent():
     robot.tick(45)
     assert robot.controller.motion.activity is Activity.GUIDED
     robot.tick(10)
-    (stopped,) = [event for event in robot.events if event.kind == "motion_stopped"]
+    (stopped,) = robot.told("motion_stopped")
     assert "external force sensor" in stopped.why
     assert "100 ms" in stopped.why
-    (ended,) = [event for event in robot.events if event.kind == "program_stopped"]
+    (ended,) = robot.told("program_stopped")
     assert ended.why == stopped.why
     robot.until_rest()
     assert robot.tick(2).flange_wrench == pytest.approx([0.0] * 6)
@@ -164,19 +164,19 @@ def test_a_move_in_force_mode_does_not_continue_without_it(how, move):
 
 def test_a_move_continues_after_a_pause_if_a_thread_restarts_force_mode():
     robot, plant = touching(1e4)
-    start(robot, *KEEP, "sleep(1)",
-          "movel(pose_trans(p[0.02,0,0,0,0,0], get_target_tcp_pose()), a=.5, v=.02)", "textmsg(1)",
+    start(robot, *KEEP, "sleep(.3)",
+          "movel(pose_trans(p[0.01,0,0,0,0,0], get_target_tcp_pose()), a=.5, v=.02)", "textmsg(1)",
           "kill t")  # fmt: skip
-    pressed(robot, plant, 800)
+    pressed(robot, plant, 220)
     here = places(robot)[-1]
     robot.send(ProgramPause)
     robot.until_rest()
     robot.send(ProgramPlay)
-    forces = pressed(robot, plant, 1200)
+    forces = pressed(robot, plant, 550)
     assert said(robot) == ["1"]
     assert failure(robot) is None
     assert places(robot)[-1][0] - here[0] > 0.005
-    assert np.abs(forces[600:900] - 20.0).max() < 2.0
+    assert np.abs(forces[400:] - 20.0).max() < 2.0
 
 
 KEEP = ("thread keep():", "while True:", DOWN, "sync()", "end", "end", "t = run keep()")

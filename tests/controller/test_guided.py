@@ -126,7 +126,10 @@ def test_a_guided_motion_stops_inside_the_range_and_keeps_the_limits(kind, field
     assert 2 * np.pi - 0.2 < arm.column("target_q")[:, 0].max() <= 2 * np.pi
     assert np.abs(velocities(arm)).max() <= UR5E.limits.velocity[0] * 1.0001
     assert np.abs(accelerations(arm)).max() <= UR5E.limits.acceleration[0] + ROUNDING
-    assert ending(arm).code == "limit_position"
+    ended = ending(arm)
+    assert ended.code == "limit_position"
+    stop = arm.column("target_q")[ended.tick - 5 :]  # and before: the stop continues the motion
+    assert np.abs(np.diff(stop, 3, axis=0)).max() / H**3 <= UR5E.limits.jerk[0] * (1 + 1e-6)
 
 
 @pytest.mark.parametrize(("fraction", "ticks"), [(1.0, 1), (0.5, 2), (0.25, 4)])
@@ -175,7 +178,7 @@ def off_line(pose, xd):
 
 def ending(arm):
     """Return the event of the first stopped motion."""
-    return next(event for event in arm.events if event.kind == "motion_stopped")
+    return arm.told("motion_stopped")[0]
 
 
 @pytest.mark.parametrize("tcp", [REST, (0.05, 0.0, 0.2, 0.0, 0.5, 0.0)])

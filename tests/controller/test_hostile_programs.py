@@ -81,7 +81,7 @@ def test_hostile_programs_cause_few_plans_and_stops(seed, monkeypatch):
     """Threads killed while they move, and short moves in quick succession, are delayed."""
     robot, beside, _ = begin(seed)
     plans, stops = Counts(monkeypatch, Planner, "plan"), Counts(monkeypatch, Stopper, "plan_stop")
-    ticks, dear = 600, 0
+    ticks, dear = 450, 0
     for _ in range(ticks):
         robot.controller.begin_tick()
         robot.controller.complete_tick()

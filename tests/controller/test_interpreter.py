@@ -18,6 +18,11 @@ def waiting(*before, mode="interpreter_mode()", after=()):
     return robot
 
 
+@pytest.fixture
+def robot():
+    return waiting()
+
+
 def add(robot, text, ticks=3):
     reply = robot.send(ProgramInterpret, text=text)
     robot.tick(ticks)
@@ -46,8 +51,7 @@ def test_statements_are_numbered_and_executed_in_order():
     assert playing(robot)
 
 
-def test_a_statement_waits_for_the_motion_before_it():
-    robot = waiting()
+def test_a_statement_waits_for_the_motion_before_it(robot):
     add(robot, f"movej({NEAR}, a=2, v=1)")
     add(robot, 'textmsg("there")')
     assert said(robot) == []
@@ -73,8 +77,7 @@ def test_the_program_continues_after_end_interpreter():
         ("sec f():\nend", "script_error", "text:1:5"),
     ],
 )
-def test_an_invalid_statement_changes_nothing(text, code, where):
-    robot = waiting()
+def test_an_invalid_statement_changes_nothing(robot, text, code, where):
     refused = add(robot, text)
     assert isinstance(refused, Refused)
     assert (refused.code, refused.where) == (code, where)
@@ -96,8 +99,7 @@ def test_clear_interpreter_forgets_definitions_of_statements_only():
     assert said(robot) == ["7", "8"]
 
 
-def test_skipping_waiting_statements_does_not_stop_the_present_move():
-    robot = waiting()
+def test_skipping_waiting_statements_does_not_stop_the_present_move(robot):
     add(robot, f"movej({NEAR}, a=2, v=1)")
     add(robot, 'textmsg("there")')
     assert robot.send(ProgramSkip, what="statements") == Done()
@@ -108,8 +110,7 @@ def test_skipping_waiting_statements_does_not_stop_the_present_move():
 
 
 @pytest.mark.parametrize("move", ["movej", "movel"])
-def test_a_skipped_move_stops_and_the_next_statement_follows(move):
-    robot = waiting()
+def test_a_skipped_move_stops_and_the_next_statement_follows(robot, move):
     add(robot, f"{move}({NEAR}, a=1, v=0.3)", 200)
     add(robot, 'textmsg("on")')
     assert robot.send(ProgramSkip, what="move") == Done()
@@ -147,13 +148,12 @@ def test_statements_sent_too_early_are_dropped_with_a_warning():
     robot.tick(60)
     add(robot, 'textmsg("late")')
     assert said(robot) == ["late"]
-    (warning,) = [event.why for event in robot.events if event.kind == "warning"]
+    (warning,) = robot.warnings()
     assert "statements 1 to 2" in warning
 
 
-def test_a_move_can_be_skipped_before_it_starts():
+def test_a_move_can_be_skipped_before_it_starts(robot):
     """A line is planned for some ticks after the call."""
-    robot = waiting()
     before = robot.states[-1].reference_q
     add(robot, f"movel({NEAR}, a=1, v=0.3)", 2)
     assert robot.send(ProgramSkip, what="move") == Done()
@@ -166,8 +166,7 @@ def test_a_move_can_be_skipped_before_it_starts():
     assert robot.states[-1].reference_q == pytest.approx(NEAR)
 
 
-def test_the_total_length_of_statements_is_limited():
-    robot = waiting()
+def test_the_total_length_of_statements_is_limited(robot):
     text = "# " + "x" * (MAX_SCRIPT // 2 - 50) + "\na = 1"
     replies = [robot.send(ProgramInterpret, text=text) for _ in range(3)]
     assert [getattr(reply, "code", None) for reply in replies] == [None, None, "busy"]
@@ -177,8 +176,7 @@ def test_the_total_length_of_statements_is_limited():
     assert state(robot).cleared == 3
 
 
-def test_statements_end_with_the_program():
-    robot = waiting()
+def test_statements_end_with_the_program(robot):
     add(robot, "sleep(10)")
     add(robot, "textmsg(1)")
     robot.send(ProgramStop)

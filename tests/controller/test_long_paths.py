@@ -61,10 +61,6 @@ def away(robot, points):
     return worst
 
 
-def warnings(robot):
-    return [event.why for event in robot.events if event.kind == "warning"]
-
-
 def begin(points, ticks=0, **changes):
     robot = a_robot(**changes)
     start(robot, *moves(points))
@@ -82,7 +78,7 @@ def test_dense_points_are_followed_quickly_without_stops(shaper):
     quickest = between.sum() * H / np.sqrt(ACCELERATION * ROUND)
     assert len(between) * H <= 1.25 * quickest
     assert robot.kinds().count("motion_started") == 1
-    assert warnings(robot) == []
+    assert robot.warnings() == []
     np.testing.assert_allclose(tool(robot)[-1], points[-1], atol=1e-9)
     assert away(robot, points) < 2e-5
     q = robot.column("reference_q")
@@ -204,7 +200,7 @@ def test_the_arm_stops_with_a_warning_if_the_next_point_is_late():
     far.tell("received", sent(points[:60]))
     robot.tick(900)
     np.testing.assert_allclose(tool(robot)[-1], points[59], atol=1e-8)
-    assert warnings(robot) == [
+    assert robot.warnings() == [
         "segments[59]: the arm stops there, since the move after it was not known in time for its blend"
     ]
     far.tell("received", sent(points[60:]))

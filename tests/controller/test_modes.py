@@ -12,7 +12,7 @@ from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_protocol.simulation import SimulationInject, SimulationReset
 from tvist_protocol.transitions import TRANSITIONS, Activity, after
 
-from .robots import Q1, Q2, Q3, UR5E, H, Robot
+from .robots import Q1, Q2, Q3, UR5E, H, NoArm, Robot
 
 Q2_, Q3_ = tuple(Q2), tuple(Q3)
 FASTEST = REDUCED_SHARE * min(UR5E.limits.velocity)
@@ -68,10 +68,10 @@ def at(activity: Activity, **changes) -> Robot:
 
 @pytest.mark.parametrize("activity", Activity)
 def test_commands_follow_the_transition_table(activity):
-    refusing = at(activity)
+    refusing = at(activity, plant=NoArm())
     for command, (kind, fields) in COMMANDS.items():
         target = after(activity, command)
-        robot = refusing if target is None else at(activity)
+        robot = refusing if target is None else at(activity, plant=NoArm())
         reply = robot.send(kind, **fields)
         assert robot.controller.motion.activity is (target or activity), command
         if target is not None:
@@ -113,14 +113,13 @@ def longest_run(true) -> int:
 
 
 @pytest.mark.parametrize(("push", "stops"), [(-200.0, False), (-300.0, None), (-1000.0, True)])
-def test_only_a_lasting_torque_overload_causes_a_protective_stop(push, stops):
-    robot = Robot()
+def test_only_a_lasting_torque_overload_causes_a_protective_stop(robot, push, stops):
     robot.tick(10)
     robot.send(SimulationInject, fault="torque", joint=1, value=push, seconds=0.004)
     robot.tick(100)
     beyond = np.abs(robot.column("actual_moment")) > np.array(UR5E.limits.torque)
     assert beyond.any()
-    stopped = [event for event in robot.events if event.kind == "protective_stop"]
+    stopped = robot.told("protective_stop")
     too_long = any(longest_run(joint) > TICKS for joint in beyond.T)
     assert bool(stopped) == too_long
     assert stops in {None, too_long}
@@ -174,8 +173,7 @@ def test_reduced_mode_slows_down_a_running_motion_temporarily(shaper, ticks):
     assert peak <= 2.0 * (1.02 if shaper == "zv" else 1.001)
 
 
-def test_a_new_motion_keeps_the_reduced_speed():
-    robot = Robot()
+def test_a_new_motion_keeps_the_reduced_speed(robot):
     robot.send(SimulationInject, fault="reduced")
     robot.send(c.MoveJ, q=Q3_)
     robot.until_rest(20000)
@@ -188,7 +186,7 @@ def test_reduced_mode_stops_and_refuses_streams_that_are_too_fast():
     robot = at(Activity.STREAMING)
     robot.send(SimulationInject, fault="reduced")
     robot.until_rest()
-    stopped = [event for event in robot.events if event.kind == "stream_stopped"]
+    stopped = robot.told("stream_stopped")
     assert [event.code for event in stopped] == ["limit_velocity"]
     reply = robot.send(c.ServoStart)
     assert (reply.code, reply.where, reply.limit) == ("limit_velocity", "velocity", pytest.approx(FASTEST))

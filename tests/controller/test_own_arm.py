@@ -95,7 +95,7 @@ def test_a_fault_of_the_arm_stops_it_until_safety_is_restarted():
     plant.fault = "joint 3 is too warm"
     robot.until_rest()
     robot.tick(2)
-    stops = [event for event in robot.events if event.kind == "safety_stop"]
+    stops = robot.told("safety_stop")
     assert [event.category for event in stops] == [0]
     assert "joint 3 is too warm" in stops[0].why
     assert "motion_stopped" in robot.kinds()
@@ -222,7 +222,7 @@ def test_an_exception_of_a_plant_method_stops_the_robot_and_is_reported(names):
     moving(robot)
     arm.cut = names
     robot.tick(5)
-    stops = [event for event in robot.events if event.kind == "safety_stop"]
+    stops = robot.told("safety_stop")
     assert [(event.category, "OSError: no cable" in event.why) for event in stops] == [(0, True)]
     assert modes(robot) == FAILED
     raised = told(robot.controller.cycle.plant)

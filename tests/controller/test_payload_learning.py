@@ -167,7 +167,7 @@ def test_a_wrong_payload_causes_a_warning_without_learning(deceived):
 @pytest.mark.parametrize(("declared", "carried"), [(0.0, 3.0), (4.0, 1.5), (2.5, 0.0)])
 def test_one_motion_is_enough_to_learn_the_payload(declared, carried):
     robot = Following(declared, carried)
-    robot.move(Q2)
+    robot.move(Q2, 2.4)
     assert robot.assumed.mass == pytest.approx(carried, abs=0.2)
     (event,) = robot.told("learnt")
     assert f"not {declared:g} kg" in event.why

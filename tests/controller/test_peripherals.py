@@ -27,8 +27,7 @@ def told(peripherals: Peripherals):
     return peripherals.io(1, paper_payload(UR5E), 1.0, {"program": None}, [0.0] * 6)
 
 
-def test_io_contains_the_external_force():
-    robot = Robot()
+def test_io_contains_the_external_force(robot):
     robot.tick(50)
     assert robot.controller.io().actual_TCP_force == pytest.approx([0.0] * 6, abs=1.0)
     robot.send(SimulationInject, fault="torque", joint=0, value=20.0, seconds=4.0)
@@ -86,8 +85,7 @@ def test_bit_registers_are_published_in_words_of_32(bank, writes):
     assert getattr(told(peripherals), f"{other}_register") == [0] * 4
 
 
-def test_io_is_published_once_per_tick_with_a_change():
-    robot = Robot()
+def test_io_is_published_once_per_tick_with_a_change(robot):
     assert robot.controller.changed_io().tick == 1  # as it begins
     robot.tick(3)
     assert robot.controller.changed_io() is None
@@ -122,8 +120,7 @@ def _placement(pose):
     return pin.SE3(pin.exp3(np.array(pose[3:])), np.array(pose[:3]))
 
 
-def test_registers_of_several_banks_are_written_together():
-    robot = Robot()
+def test_registers_of_several_banks_are_written_together(robot):
     more = (
         Registers(bank="input_double", first=3, values=(0.5, 2)),
         Registers(bank="input_bit", values=(True,)),

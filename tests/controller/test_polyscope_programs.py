@@ -44,10 +44,6 @@ global Plane_1 = p[0.1, 0.2, 0.3, 0.0, 0.0, 1.57]
 """.strip().splitlines()
 
 
-def warnings(robot):
-    return [event.why for event in robot.events if event.kind == "warning"]
-
-
 def test_a_polyscope_preamble_is_accepted_and_its_settings_show_in_rtde():
     robot = run(
         a_robot(),
@@ -56,7 +52,7 @@ def test_a_polyscope_preamble_is_accepted_and_its_settings_show_in_rtde():
         "textmsg([get_gravity(), get_base_acceleration(), get_tool_current(), motion_version_get()])",
     )
     assert failure(robot) is None
-    assert warnings(robot) == []
+    assert robot.warnings() == []
     assert said(robot) == ["[[0, 0, 9.82], [0, 0, 0], 0, 1]"]
     snapshot = Instruments(UR5E).snapshot(robot.states[-1], robot.controller.io())
     assert (snapshot.tool_analog_input_types, snapshot.tool_output_mode) == (2, 1)
@@ -74,7 +70,7 @@ def test_a_polyscope_preamble_is_accepted_and_its_settings_show_in_rtde():
 def test_settings_without_effect_cause_a_warning(call, why):
     robot = run(a_robot(), call)
     assert failure(robot) is None
-    assert [why in one for one in warnings(robot)] == [True]
+    assert [why in one for one in robot.warnings()] == [True]
 
 
 def test_time_is_robot_time_and_random_is_reproducible():

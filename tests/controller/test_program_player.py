@@ -11,7 +11,7 @@ from .robots import Q1, Q2, Q3, Robot
 
 ALL = [q.tolist() for q in (Q1, Q2, Q3, Q2, Q1)]
 """Where the program `paper.urp` goes."""
-LONG = 600
+LONG = 300
 """Ticks in which a line would begin and a stop ends."""
 
 
@@ -59,8 +59,8 @@ def test_a_program_makes_its_moves_in_order_without_gaps(robot):
     until(robot, stopped(robot))
     assert reached(robot) == ALL
     assert state(robot) == ("paper.urp", "STOPPED", 0)
-    done = [event.tick for event in robot.events if event.kind == "motion_done"]
-    started = [event.tick for event in robot.events if event.kind == "motion_started"]
+    done = [event.tick for event in robot.told("motion_done")]
+    started = [event.tick for event in robot.told("motion_started")]
     assert started == [1, *(tick + 1 for tick in done[:-1])]
 
 

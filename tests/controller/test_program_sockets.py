@@ -65,11 +65,8 @@ def test_socket_open_connects_and_returns_the_result():
     far.tell("opened")
     robot.tick()
     far.tell("failed", number=2)
-    finish(robot)
-    assert said(robot) == ["True", "False"]
-    assert [event.why for event in robot.events if event.kind == "warning"] == [
-        'socket_open: "two" has no connection to h port 7'
-    ]
+    assert said(finish(robot)) == ["True", "False"]
+    assert robot.warnings() == ['socket_open: "two" has no connection to h port 7']
     assert {order.socket for order in far.of(Close)} == {1, 2}
 
 
@@ -118,8 +115,7 @@ def test_messages_are_read_once_and_whole_however_the_bytes_are_split(messages, 
         far.tell("received", stream[:size])
         stream = stream[size:]
         robot.tick(data.draw(st.integers(0, 3)))
-    finish(robot)
-    assert said(robot) == expected
+    assert said(finish(robot)) == expected
     assert sum(order.amount for order in far.of(Taken)) == size_of_all
 
 
@@ -133,8 +129,7 @@ def test_a_read_times_out_only_after_robot_time_and_wall_time():
     robot.tick(500)
     assert playing(robot)
     far.expire()
-    finish(robot)
-    assert said(robot) == ["[0, -1, -1]"]
+    assert said(finish(robot)) == ["[0, -1, -1]"]
 
 
 def test_incomplete_data_stays_for_the_next_read():
@@ -145,8 +140,7 @@ def test_incomplete_data_stays_for_the_next_read():
     far.expire()
     robot.tick(1)
     far.tell("received", b"\0\5" + ints(6))
-    finish(robot)
-    assert said(robot) == ["[2, 7, 8]", "[0, -1, -1]", "[2, 5, 6]"]
+    assert said(finish(robot)) == ["[2, 7, 8]", "[0, -1, -1]", "[2, 5, 6]"]
 
 
 def test_a_socket_closed_remotely_returns_received_data_then_failures():
@@ -157,8 +151,7 @@ def test_a_socket_closed_remotely_returns_received_data_then_failures():
     far.tell("closed")
     robot.tick(90)
     assert playing(robot)
-    finish(robot, 40)
-    assert said(robot) == ["[1, 4]", "False"]
+    assert said(finish(robot, 40)) == ["[1, 4]", "False"]
     assert not far.sent
     assert failure(robot) is None
 

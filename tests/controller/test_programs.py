@@ -5,7 +5,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from tvist_controller.kinematics.arm import Arm
 from tvist_controller.kinematics.pose import placement_vector
 from tvist_protocol import commands as c
 from tvist_protocol.io import SetRegisters
@@ -15,22 +14,26 @@ from tvist_protocol.replies import Accepted, Done
 from tvist_protocol.values import Payload
 from tvist_urscript import EVALUATIONS
 
-from .robots import UR5E
+from .forces import KINEMATICS, places
 from .scripts import URSIM, a_robot, failure, finish, playing, run, said, script, start
 
-KINEMATICS = Arm(UR5E)
 HERE = placement_vector(*KINEMATICS.pose(np.array(URSIM)))
 NEAR = [angle + 0.2 for angle in URSIM]
 
 
+@pytest.fixture
+def robot():
+    return a_robot()
+
+
 def ended(robot):
     """Return why each program has ended, None for those that ended by themselves."""
-    return [event.why for event in robot.events if event.kind == "program_stopped"]
+    return [event.why for event in robot.told("program_stopped")]
 
 
 def told(robot):
     """Return the ticks in which programs wrote a text."""
-    return [event.tick for event in robot.events if event.kind == "text"]
+    return [event.tick for event in robot.told("text")]
 
 
 def pose(dx=0.0, dy=0.0, dz=0.0):
@@ -42,11 +45,6 @@ def pose(dx=0.0, dy=0.0, dz=0.0):
 def place(dx, dy, dz):
     """Return a position near the start [m]."""
     return np.array([HERE[0] + dx, HERE[1] + dy, HERE[2] + dz])
-
-
-def places(robot):
-    """Return the tool's positions before shaping, one per tick [m]."""
-    return np.array([KINEMATICS.pose(np.array(state.reference_q))[1] for state in robot.states])
 
 
 def test_movej_is_bit_equal_to_the_command_move_j():
@@ -63,7 +61,7 @@ def test_movel_equals_the_command_move_l_after_a_fixed_delay():
     x, y, z, *turn = HERE
     other.send(MoveL, pose=(x, y + 0.1, z, *turn), acceleration=1.0, velocity=0.2)
     other.tick(len(one.states))
-    delay = next(event.tick for event in one.events if event.kind == "motion_started") - 1
+    delay = one.told("motion_started")[0].tick - 1
     assert delay == 10
     moved = [state.target_q for state in one.states[delay:]]
     assert moved == [state.target_q for state in other.states[: len(moved)]]
@@ -72,14 +70,13 @@ def test_movel_equals_the_command_move_l_after_a_fixed_delay():
 def test_statements_after_a_move_run_when_the_shaped_reference_rests():
     robot = a_robot(shaper="zv")
     run(robot, f"movej({NEAR})", "textmsg(norm(get_target_joint_speeds()))")
-    done = next(event.tick for event in robot.events if event.kind == "motion_done")
-    told = next(event.tick for event in robot.events if event.kind == "text")
+    done = robot.told("motion_done")[0].tick
+    told = robot.told("text")[0].tick
     assert told == done + 1
     assert float(said(robot)[0]) < 1e-4
 
 
-def test_movej_to_a_pose_uses_the_nearest_joint_positions():
-    robot = a_robot()
+def test_movej_to_a_pose_uses_the_nearest_joint_positions(robot):
     run(robot, f"movej({pose(dz=0.05)})")
     np.testing.assert_allclose(places(robot)[-1], place(0, 0, 0.05), atol=1e-6)
     assert np.abs(np.array(robot.states[-1].reference_q) - URSIM).max() < 0.5
@@ -135,8 +132,7 @@ FORCE = "force_mode(p[0,0,0,0,0,0], {}, [0,0,1,0,0,0], {}, {})"
     ('modbus_add_signal("1.2.3.4", 255, 0, 0, "x", True)', "does not simulate Modbus"),
     ("x = struct(a=1)\nx.go(1)", "go: this controller does not simulate remote procedure calls and Ethernet/IP"),
 ])  # fmt: skip
-def test_invalid_arguments_end_the_program_at_their_call(call, why):
-    robot = a_robot()
+def test_invalid_arguments_end_the_program_at_their_call(robot, call, why):
     run(robot, "textmsg(1)", call, "textmsg(2)")
     error = failure(robot)
     assert why in error.why
@@ -146,8 +142,7 @@ def test_invalid_arguments_end_the_program_at_their_call(call, why):
 
 
 @pytest.mark.parametrize("target", ["p[10,0,0,0,0,0]", pose(dz=-0.8)])
-def test_an_impossible_line_causes_a_protective_stop_that_can_be_unlocked(target):
-    robot = a_robot()
+def test_an_impossible_line_causes_a_protective_stop_that_can_be_unlocked(robot, target):
     run(robot, f"movel({target})", "textmsg(1)")
     assert robot.controller.programs.state == "PAUSED"
     assert robot.states[-1].safety_mode == 3
@@ -166,11 +161,10 @@ def test_effects_between_blended_moves_happen_in_the_blend():
     assert 1e-4 < away.min() < radius
     corner, end = told(robot)
     assert away[corner - 1] == pytest.approx(radius, abs=1.5e-3)
-    assert end == next(event.tick for event in robot.events if event.kind == "motion_done") + 1
+    assert end == robot.told("motion_done")[0].tick + 1
 
 
-def test_the_end_of_a_servoj_thread_stops_the_arm():
-    robot = a_robot()
+def test_the_end_of_a_servoj_thread_stops_the_arm(robot):
     aim = [angle + 0.05 for angle in URSIM]
     servo = f"while True:\n servoj({aim}, t=0.002, lookahead_time=0.03, gain=1200)\n end"
     start(robot, f"thread servo():\n {servo}\n end", "handle = run servo()", "sleep(1)", "kill handle", "sleep(1)",
@@ -182,8 +176,7 @@ def test_the_end_of_a_servoj_thread_stops_the_arm():
     assert failure(robot) is None
 
 
-def test_stopj_stops_the_move_of_a_killed_thread():
-    robot = a_robot()
+def test_stopj_stops_the_move_of_a_killed_thread(robot):
     run(robot, f"thread go():\n movej({[URSIM[0] + 1.0, *URSIM[1:]]}, a=2, v=1)\n end", "handle = run go()",
         "sleep(0.4)", "kill handle", "stopj(1.0)", "textmsg(norm(get_target_joint_speeds()))")  # fmt: skip
     assert float(said(robot)[0]) < 1e-6
@@ -192,15 +185,13 @@ def test_stopj_stops_the_move_of_a_killed_thread():
     assert -1.6 < slowest < -0.9
 
 
-def test_two_threads_cannot_move_the_arm_at_once():
-    robot = a_robot()
+def test_two_threads_cannot_move_the_arm_at_once(robot):
     run(robot, f"thread go():\n movej({NEAR})\n end", "run go()", "sleep(0.1)", f"movej({list(URSIM)})")
     assert "another thread is controlling the robot" in failure(robot).why
     assert robot.until_rest()
 
 
-def test_speedj_returns_after_its_time_and_keeps_the_speed():
-    robot = a_robot()
+def test_speedj_returns_after_its_time_and_keeps_the_speed(robot):
     run(robot, "speedj([0.1, 0, 0, 0, 0, 0], 1, 0.3)", "textmsg(get_target_joint_speeds()[0])", "sleep(0.2)")
     assert float(said(robot)[0]) == pytest.approx(0.1, abs=1e-6)
     assert told(robot) == [151]
@@ -208,8 +199,7 @@ def test_speedj_returns_after_its_time_and_keeps_the_speed():
     robot.until_rest()
 
 
-def test_written_registers_are_published_in_the_same_tick():
-    robot = a_robot()
+def test_written_registers_are_published_in_the_same_tick(robot):
     start(robot, "sleep(0.01)", "write_output_float_register(3, 1.5)", "sleep(1)")
     told = []
     for _ in range(20):
@@ -221,20 +211,17 @@ def test_written_registers_are_published_in_the_same_tick():
     assert told[-1] == (6, 1.5)
 
 
-def test_a_program_reads_registers_written_by_a_client():
-    robot = a_robot()
+def test_a_program_reads_registers_written_by_a_client(robot):
     start(robot, "while read_input_integer_register(24) == 0:", "  sync()", "end",
           "textmsg(read_input_float_register(47))", "textmsg(read_input_boolean_register(64))")  # fmt: skip
     robot.tick(50)
     assert said(robot) == []
     for bank, first, value in (("input_double", 47, 2.5), ("input_bit", 64, True), ("input_int", 24, 7)):
         assert robot.send(SetRegisters, bank=bank, first=first, values=(value,)) == Done()
-    finish(robot)
-    assert said(robot) == ["2.5", "True"]
+    assert said(finish(robot)) == ["2.5", "True"]
 
 
-def test_outputs_can_be_read_back():
-    robot = a_robot()
+def test_outputs_can_be_read_back(robot):
     run(robot, "set_standard_digital_out(3, True)", "set_tool_digital_out(1, True)", "digital_out[0] = True",
         "set_analog_outputdomain(1, 1)", "set_standard_analog_out(1, 0.25)", "set_tool_voltage(24)",
         "textmsg(get_standard_digital_out(3))", "textmsg(get_standard_analog_out(1))")  # fmt: skip
@@ -245,16 +232,14 @@ def test_outputs_can_be_read_back():
     assert said(robot) == ["True", "0.25"]
 
 
-def test_a_blocking_popup_waits_until_it_is_closed():
-    robot = a_robot()
+def test_a_blocking_popup_waits_until_it_is_closed(robot):
     start(robot, 'popup("look", title="T", warning=True, blocking=True)', "textmsg(1)")
     robot.tick(100)
-    (shown,) = (event for event in robot.events if event.kind == "popup")
+    (shown,) = robot.told("popup")
     assert (shown.why, shown.title, shown.level) == ("look", "T", "warning")
     assert said(robot) == []
     assert robot.controller.receive(ProgramClosePopup()) == Done()
-    finish(robot)
-    assert said(robot) == ["1"]
+    assert said(finish(robot)) == ["1"]
 
 
 @pytest.mark.parametrize(("action", "state"), [("pause", "PAUSED"), ("stop", "STOPPED")])
@@ -290,22 +275,19 @@ def test_the_published_payload_changes_within_the_transition_time(seconds):
     assert (masses[0], masses[-1]) == (2.0, 1.0)
 
 
-def test_secondary_programs_run_beside_the_main_one_without_moves():
-    robot = a_robot()
+def test_secondary_programs_run_beside_the_main_one_without_moves(robot):
     start(robot, "sleep(0.1)", "textmsg(2)")
     robot.tick(2)
     text = "sec extra():\n  set_standard_digital_out(0, True)\n  textmsg(1)\nend\n"
     assert robot.send(ProgramRun, text=text) == Done()
-    finish(robot)
-    assert said(robot) == ["1", "2"]
+    assert said(finish(robot)) == ["1", "2"]
     assert robot.controller.io().actual_digital_output_bits == 1
     refused = robot.send(ProgramRun, text=f"sec extra():\n  movej({NEAR})\nend\n")
     assert refused.code == "script_error"
 
 
 @pytest.mark.parametrize(("main", "extra"), [("halt", "sync()"), ("sync()", "halt")])
-def test_halt_ends_all_programs_and_the_motion(main, extra):
-    robot = a_robot()
+def test_halt_ends_all_programs_and_the_motion(robot, main, extra):
     start(robot, "speedj([0.5,0,0,0,0,0], 2, 0.1)", "sleep(0.1)", "while True:", main, "end")
     robot.tick(2)
     counts = "n = n + 1\n    write_output_integer_register(3, n)\n    sync()"
@@ -317,8 +299,7 @@ def test_halt_ends_all_programs_and_the_motion(main, extra):
     assert robot.controller.peripherals.read("output_int", 3) == last
 
 
-def test_a_new_program_replaces_the_running_one_and_waits_for_rest():
-    robot = a_robot()
+def test_a_new_program_replaces_the_running_one_and_waits_for_rest(robot):
     start(robot, "speedj([0.5,0,0,0,0,0], 2, 9)", name="one")
     robot.tick(300)
     start(robot, f"movej({NEAR})", name="two")
@@ -329,8 +310,7 @@ def test_a_new_program_replaces_the_running_one_and_waits_for_rest():
     assert (np.abs(np.diff(robot.column("target_qd"), axis=0)) / 0.002).max() < 40.0
 
 
-def test_the_speed_slider_stretches_speedj_but_not_sleep():
-    robot = a_robot()
+def test_the_speed_slider_stretches_speedj_but_not_sleep(robot):
     robot.send(c.SetSpeed, fraction=0.5)
     run(robot, "speedj([0.1,0,0,0,0,0], 1.0, 0.2)", "textmsg(1)", "sleep(0.2)", "textmsg(2)", "stopj(5)")
     first, second = told(robot)
@@ -338,8 +318,7 @@ def test_the_speed_slider_stretches_speedj_but_not_sleep():
     assert second - first == 100
 
 
-def test_the_end_of_a_program_has_a_reason_unless_it_finished():
-    robot = a_robot()
+def test_the_end_of_a_program_has_a_reason_unless_it_finished(robot):
     run(robot, "sleep(0.1)")
     assert ended(robot) == [None]
     start(robot, "sleep(10)", name="first")
@@ -369,7 +348,7 @@ def test_a_rounded_inertia_is_corrected_with_a_warning(zz, found):
     assert failure(robot) is None
     kept = robot.controller.declared.inertia
     assert [kept[0], kept[3], kept[5]] == pytest.approx(found or [0.001, 0.001, 0.002], abs=1e-9)
-    warnings = [event.why for event in robot.events if event.kind == "warning"]
+    warnings = robot.warnings()
     assert [zz in why and "5e-05" in why for why in warnings] == [True] * bool(found)
 
 
@@ -384,7 +363,7 @@ ARC = (
 
 def warned(line, **changes):
     robot = run(a_robot(**changes), line)
-    return [(event.code, event.why) for event in robot.events if event.kind == "warning"]
+    return [(event.code, event.why) for event in robot.told("warning")]
 
 
 @pytest.mark.parametrize(
@@ -427,23 +406,20 @@ LINE = f"movel({pose(dy=0.1)}, a=1.0, v=0.2)"
 
 
 @pytest.mark.parametrize("ticks", [1, 5, 9])
-def test_a_client_may_move_the_arm_while_a_line_is_planned(ticks):
+def test_a_client_may_move_the_arm_while_a_line_is_planned(robot, ticks):
     """The program stops the client's motion first, as it does if one continues when a move is called."""
-    robot = a_robot()
     start(robot, LINE, "textmsg(1)")
     robot.tick(ticks)
     moved = robot.send(c.MoveJ, q=tuple(NEAR))
     assert isinstance(moved, Accepted)
-    finish(robot)
-    assert said(robot) == ["1"]
+    assert said(finish(robot)) == ["1"]
     assert failure(robot) is None
     ended = [(event.kind, event.id) for event in robot.events if event.id is not None]
     assert ended == [("motion_started", 1), ("motion_stopped", 1), ("motion_started", 2), ("motion_done", 2)]
     np.testing.assert_allclose(places(robot)[-1], place(0, 0.1, 0), atol=1e-6)
 
 
-def test_a_resumed_servoc_can_be_paused_again():
-    robot = a_robot()
+def test_a_resumed_servoc_can_be_paused_again(robot):
     start(robot, f"servoc({pose(dy=0.1)}, a=1.0, v=0.05)", "textmsg(1)")
     robot.tick(200)
     assert robot.send(ProgramPause) == Done()
@@ -456,14 +432,12 @@ def test_a_resumed_servoc_can_be_paused_again():
     robot.tick(100)
     assert robot.controller.cycle.mode.at_rest
     assert robot.send(ProgramPlay) == Done()
-    finish(robot)
-    assert said(robot) == ["1"]
+    assert said(finish(robot)) == ["1"]
 
 
 @pytest.mark.parametrize("move", [f"movej({NEAR})", LINE, "speedj([0.1, 0, 0, 0, 0, 0], 1, 0.2)", "sync()"])
-def test_protective_stop_pauses_the_program_at_the_next_waiting_statement(move):
+def test_protective_stop_pauses_the_program_at_the_next_waiting_statement(robot, move):
     """Also at a move in the same tick, which is carried out after the program is played again."""
-    robot = a_robot()
     start(robot, "protective_stop()", move, "textmsg(1)")
     robot.tick(20)
     assert robot.controller.programs.state == "PAUSED"
@@ -471,8 +445,7 @@ def test_protective_stop_pauses_the_program_at_the_next_waiting_statement(move):
     assert robot.send(c.UnlockProtectiveStop) == Done()
     assert robot.controller.programs.state == "PAUSED"
     assert robot.send(ProgramPlay) == Done()
-    finish(robot)
-    assert said(robot) == ["1"]
+    assert said(finish(robot)) == ["1"]
     assert ("motion_started" in robot.kinds()) == (move != "sync()")
 
 
@@ -485,8 +458,7 @@ GUIDED = (
 
 
 @pytest.mark.parametrize("move", GUIDED)
-def test_a_guided_motion_waits_for_the_stop_of_the_previous_program(move):
-    robot = a_robot()
+def test_a_guided_motion_waits_for_the_stop_of_the_previous_program(robot, move):
     start(robot, "speedj([0.5, 0, 0, 0, 0, 0], 2, 9)")
     robot.tick(200)
     start(robot, move, "textmsg(1)")
@@ -509,7 +481,7 @@ def guiding(work):
 def test_a_thread_that_misses_turns_is_reported_once():
     robot = guiding("    i = 0\n    while i < 1100:\n      i = i + 1\n    end")
     robot.tick(200)
-    (warning,) = [event.why for event in robot.events if event.kind == "warning"]
+    (warning,) = robot.warnings()
     assert warning.startswith("guide, line ")
     assert f"had no turn within the {EVALUATIONS} evaluations" in warning
     assert robot.states[-1].target_qd[0] == pytest.approx(0.2)
@@ -525,7 +497,7 @@ def test_the_arm_slows_down_while_its_guiding_thread_computes():
     assert max(speeds) < 0.1  # it slowed down before it reached 0.2
     assert sum(speed == 0.0 for speed in speeds[first:]) > 500
     assert sum(a == 0.0 < b for a, b in pairwise(speeds)) >= 2
-    assert [event for event in robot.events if event.kind == "warning" and "slows down" in event.why]
+    assert any("slows down" in why for why in robot.warnings())
 
 
 STOPS = "thread t():\n protective_stop()\n end"
@@ -540,8 +512,7 @@ LAST = {
 
 
 @pytest.mark.parametrize("lines", LAST.values(), ids=LAST)
-def test_a_final_protective_stop_ends_the_program(lines):
-    robot = a_robot()
+def test_a_final_protective_stop_ends_the_program(robot, lines):
     start(robot, *lines)
     finish(robot)
     assert robot.controller.programs.state == "STOPPED"

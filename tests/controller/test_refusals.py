@@ -217,8 +217,7 @@ def test_a_stale_token_is_refused_before_other_checks():
         assert_unchanged(robot, twin, 3)
 
 
-def test_set_points_of_a_step_are_checked():
-    robot = Robot()
+def test_set_points_of_a_step_are_checked(robot):
     robot.send(c.ServoStart)
     good, bad = StepSetpoint(sequence=0, q=Q1_), StepSetpoint(sequence=1, q=(9.0, *Q1_[1:]))
     reply = robot.send(SimulationStep, ticks=2, setpoints=(good, bad))

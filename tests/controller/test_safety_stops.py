@@ -22,10 +22,6 @@ def inject(robot, fault, **fields):
     assert robot.send(SimulationInject, fault=fault, **fields) == Done()
 
 
-def told(robot, kind):
-    return [event for event in robot.events if event.kind == kind]
-
-
 def moving(ticks=300):
     robot = Robot()
     assert isinstance(robot.send(c.MoveJ, **MOVE), Accepted)
@@ -36,11 +32,11 @@ def moving(ticks=300):
 def test_a_safeguard_stop_pauses_the_motion_until_its_release():
     robot = moving()
     inject(robot, "safeguard_stop")
-    robot.tick(1500)
+    robot.tick(700)
     state = robot.states[-1]
     assert (state.safety_mode, state.runtime_state) == (SafetyMode.SAFEGUARD_STOP, RuntimeState.PAUSED)
     assert state.robot_mode == RobotMode.RUNNING
-    assert [event.category for event in told(robot, "safety_stop")] == [2]
+    assert [event.category for event in robot.told("safety_stop")] == [2]
     assert robot.send(c.Resume).code == "wrong_mode"
     assert robot.send(c.MoveJ, **MOVE).code == "busy"
     inject(robot, "normal")
@@ -55,9 +51,9 @@ def test_a_motion_paused_by_a_client_waits_for_resume(first):
     robot = moving()
     for what in ("pause", "safeguard") if first == "pause" else ("safeguard", "pause"):
         robot.send(c.Pause) if what == "pause" else inject(robot, "safeguard_stop")
-    robot.tick(1500)
+    robot.tick(700)
     inject(robot, "normal")
-    robot.tick(500)
+    robot.tick(50)
     assert robot.states[-1].runtime_state == RuntimeState.PAUSED
     assert robot.send(c.Resume) == Done()
     robot.until_rest()
@@ -75,8 +71,8 @@ def test_an_emergency_stop_stops_on_the_path_and_cuts_power_until_released(fault
     assert modes(rested) == (mode, RobotMode.POWER_OFF)
     way = np.array(rested.target_q) - Q1
     assert np.abs(way - (way @ (Q3 - Q1)) / ((Q3 - Q1) @ (Q3 - Q1)) * (Q3 - Q1)).max() < 1e-9
-    stop = told(robot, "safety_stop")[0]
-    assert stop.category == told(robot, "motion_stopped")[0].category == 1
+    stop = robot.told("safety_stop")[0]
+    assert stop.category == robot.told("motion_stopped")[0].category == 1
     assert stop.duration == pytest.approx((rested.tick - stop.tick) * H, abs=4 * H)
     refused = robot.send(c.PowerOn)
     assert (refused.code, "release the emergency stop" in refused.why) == ("wrong_mode", True)
@@ -97,7 +93,7 @@ def test_a_violation_or_fault_brakes_and_stays_until_safety_is_restarted(fault):
     assert modes(robot.tick()) == (mode, RobotMode.POWER_OFF)
     rested = robot.until_rest()
     assert rested.safety_mode == mode
-    stop = told(robot, "safety_stop")[0]
+    stop = robot.told("safety_stop")[0]
     assert stop.category == 0
     assert stop.duration == pytest.approx((rested.tick - stop.tick) * H, abs=4 * H)
     inject(robot, "normal")
@@ -147,8 +143,7 @@ def test_brakes_slow_every_joint_monotonically_to_rest(seed):
 
 
 @pytest.mark.parametrize("fault", ["safeguard_stop", "emergency_stop", "reduced"])
-def test_a_safety_input_set_again_loses_its_earlier_end_time(fault):
-    robot = Robot()
+def test_a_safety_input_set_again_loses_its_earlier_end_time(robot, fault):
     inject(robot, fault, seconds=0.1)
     inject(robot, "normal")
     assert robot.tick().safety_mode == SafetyMode.NORMAL
@@ -183,8 +178,7 @@ def test_info_has_reason_and_tick_of_every_stop(fault):
     assert said(robot).stop.tick == 101
 
 
-def test_info_names_a_released_emergency_stop_while_power_is_off():
-    robot = Robot()
+def test_info_names_a_released_emergency_stop_while_power_is_off(robot):
     inject(robot, "emergency_stop")
     inject(robot, "normal")
     assert modes(robot.tick(10)) == (SafetyMode.NORMAL, RobotMode.POWER_OFF)
@@ -193,8 +187,7 @@ def test_info_names_a_released_emergency_stop_while_power_is_off():
     assert said(robot).stop is None
 
 
-def test_a_less_severe_stop_does_not_replace_the_reason():
-    robot = Robot()
+def test_a_less_severe_stop_does_not_replace_the_reason(robot):
     inject(robot, "violation")
     for fault in ("safeguard_stop", "emergency_stop"):
         inject(robot, fault)

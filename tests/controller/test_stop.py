@@ -28,9 +28,8 @@ def until_rest(line):
     return np.array(out)
 
 
-def test_a_stop_is_no_later_and_no_further_than_the_move():
+def test_a_stop_is_no_later_and_no_further_than_the_move(robot):
     """If no deceleration on the ladder keeps the torque limits, the move itself is the stop."""
-    robot = Robot()
     robot.send(SimulationReset, q=(0.0, -1.57, 0.0, -1.57, 0.0, 0.0))
     limits = {"velocity": 3.14, "acceleration": 4.0, "jerk": 2000.0}
     target = (0.0, -0.2, 0.0, -1.57, 0.0, 0.0)
@@ -82,9 +81,8 @@ def test_only_a_harder_stop_replaces_a_gentle_one():
 
 
 @pytest.mark.parametrize(("name", "way"), [("um_zv", 0.003), ("um_zv", 0.6), ("um_zvd", 0.05)])
-def test_with_negative_impulses_a_motion_is_done_after_all_echoes(name, way):
+def test_with_negative_impulses_a_motion_is_done_after_all_echoes(robot, name, way):
     """Echoes cancel for a moment: a shaped reference that stands still may move again."""
-    robot = Robot()
     robot.send(c.SetEstimator, name="fixed", f_d=(5.0,), zeta=(0.05,))
     robot.send(c.SetShaper, name=name)
     robot.send(c.MoveJ, q=tuple(Q3 + way * (Q1 - Q3)) if way > 0.5 else tuple(Q1 + way))

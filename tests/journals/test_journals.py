@@ -20,7 +20,7 @@ from tvist_protocol.stream import Truth
 
 FOLDER = Path(__file__).parent
 RUNS = sorted(FOLDER.glob("*.mcap"))
-QUICK = ("speeds", "tool_paths", "elastic_with_a_payload", "cell_with_a_gripper", "live_lost_lease")
+QUICK = ("speeds", "tool_paths", "elastic_with_a_payload", "live_lost_lease")
 """Runs that are short, and different in what moves the arm."""
 OTHERS = [path.stem for path in RUNS if path.stem not in QUICK]
 POSITION = 1e-6

@@ -66,7 +66,7 @@ def test_program_is_read_from_a_pipe(tmp_path):
     command = [sys.executable, "-m", "tvist_cli", "run", "-", "--lockstep"]
     said = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path, input=FAILS)
     assert (said.returncode, said.stdout) == (1, "")
-    assert said.stderr.startswith("<stdin>:4:9: ")
+    assert "<stdin>:4:9: " in said.stderr
 
 
 class TestInLockstep:
@@ -81,7 +81,7 @@ class TestInLockstep:
 
     def test_error_is_reported_with_file_line_and_column_and_exit_code_1(self, called):
         code, out, err = called("run", "fails.script", "--lockstep")
-        place, account = err.splitlines()
+        *_, place, account = err.splitlines()
         assert (code, out) == (1, "")
         assert place.startswith("fails.script:4:9: ")
         assert account == "tvist: fails.script ended with an error after 0.100 s of robot time"
@@ -181,10 +181,10 @@ class TestJudged:
         assert (told["file"], told["lockstep"]) == ("moves.script", True)
         assert told["seconds"] > 1.0
         assert {one["kind"] for one in told["failures"]} == {"max_seconds", "max_shake"}
-        first, second, *_, last = err.splitlines()
+        first, second, *_ = (line for line in err.splitlines() if line.startswith("moves.script:"))
         assert first.startswith("moves.script: it ran for ")
         assert second.startswith("moves.script:3: after move 1, which stopped at ")
-        assert last == "tvist: moves.script broke 3 limits"
+        assert err.endswith("\ntvist: moves.script broke 3 limits\n")
 
     def test_run_equals_its_baseline_but_not_with_another_shaper(self, called, tmp_path):
         run = ("run", "moves.script", "fails.script", "--lockstep")

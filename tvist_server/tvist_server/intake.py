@@ -5,8 +5,9 @@ from collections.abc import Callable
 from functools import partial
 
 from tvist_controller.dispatch.admission import Admitted, admit, admit_command, admit_setpoint
-from tvist_controller.dispatch.rights import NoControlError, Presence
+from tvist_controller.dispatch.rights import Presence
 from tvist_controller.host import Host
+from tvist_controller.refusal import RefusalError
 from tvist_protocol.commands import Command, HandOver, TakeClock, TakeControl
 from tvist_protocol.replies import Refused, Reply
 from tvist_server.gateways.base import Answer, CommandIntake
@@ -85,7 +86,7 @@ class RobotIntake(CommandIntake):
                 with self._lock:
                     admitted = admitted._replace(session=self._presence.session_of(client))
                 answer = self._unless_gone(client, answer)
-            except NoControlError as error:
+            except RefusalError as error:
                 admitted = error.reply
         if isinstance(admitted, Refused):
             with self._lock:

@@ -6,7 +6,6 @@ from typing import Annotated, Literal, get_args
 from msgspec import Meta, Struct
 
 from tvist_plant.description import is_real_body
-from tvist_plant.plant import PERIOD
 from tvist_protocol.values import Inertia6, Mass, Payload, Pose, Vec3
 
 Terminal = Literal[
@@ -37,11 +36,6 @@ class CellWire(_Table, frozen=True, kw_only=True):
     after: Annotated[float, Meta(ge=0, le=3600)] = 0.0
     """Delay of the input, rounded to ticks of 2 ms, at least one tick [s]."""
     inverted: bool = False  # whether the input is on while the output is off
-
-    @property
-    def ticks(self) -> int:
-        """Delay of the input in ticks."""
-        return max(1, round(self.after / PERIOD))
 
 
 class Tool(_Table, frozen=True, kw_only=True):
@@ -107,11 +101,6 @@ class Cell(_Table, frozen=True, kw_only=True):
     """Parts that the gripper can grip."""
     world: Annotated[str, Meta(min_length=1, max_length=4096)] | None = None
     """Scene around the arm, as `tvist serve --world`; its bodies are gripped, and `parts` stays empty."""
-
-    @property
-    def changes_load(self) -> bool:
-        """Whether the carried payload can change."""
-        return bool(self.parts) or len(self.tools) > 1
 
     @property
     def gripping_tool(self) -> Tool | None:

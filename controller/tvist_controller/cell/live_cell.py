@@ -14,7 +14,7 @@ from tvist_controller.kinematics.arm import Arm
 from tvist_controller.kinematics.pose import Placement, placement
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import Floats, payload_inertia
-from tvist_plant.plant import Plant
+from tvist_plant.plant import PERIOD, Plant
 from tvist_protocol.values import Pose
 
 TRANSFER = 100
@@ -43,7 +43,10 @@ class Wires:
     """The delayed wires of a cell."""
 
     def __init__(self, wires: Sequence[CellWire]) -> None:
-        self._wires = [(bit_of(one.output), bit_of(one.input), one.ticks, one.inverted) for one in wires]
+        self._wires = [
+            (bit_of(one.output), bit_of(one.input), max(1, round(one.after / PERIOD)), one.inverted)
+            for one in wires
+        ]
         self._outputs: int | None = None  # outputs of the last tick; None before the first
         # Entries of one wire are in order of time, since its delay is constant.
         self._under_way: list[deque[tuple[int, bool]]] = [deque() for _ in wires]
@@ -75,7 +78,7 @@ class LiveCell:
     def __init__(
         self, cell: Cell, description: RobotDescription, plant: Plant, terminals: Terminals, emit: Emit
     ) -> None:
-        if cell.changes_load and not plant.can(Plant.load):
+        if (cell.parts or len(cell.tools) > 1) and not plant.can(Plant.load):
             name = type(plant).__name__
             raise ValueError(
                 f"cell: the plant {name} cannot carry another payload while it moves, since it has no load: leave "

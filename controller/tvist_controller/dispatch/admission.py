@@ -8,7 +8,6 @@ import msgspec
 from tvist_controller.dispatch.rights import (
     CLOCK,
     Lease,
-    NoControlError,
     check_free,
     check_step,
     check_step_token,
@@ -17,6 +16,7 @@ from tvist_controller.dispatch.rights import (
 )
 from tvist_controller.dispatch.table import COMMANDS
 from tvist_controller.motion.setpoints import Unreadable
+from tvist_controller.refusal import RefusalError
 from tvist_protocol.channels import tag
 from tvist_protocol.codec import Envelope, decode, decode_command, decode_envelope, refusal
 from tvist_protocol.commands import Command, ReleaseClock, Setpoint, TakeClock, TakeControl
@@ -49,7 +49,7 @@ def admit(data: bytes, lease: Lease | None, clock: Lease | None = None) -> Admit
         return admit_command(decode_command(data), lease, clock)
     except ProtocolError as error:
         return refusal(error)
-    except NoControlError as error:
+    except RefusalError as error:
         return error.reply
 
 
@@ -57,7 +57,7 @@ def admit_command(command: Command, lease: Lease | None, clock: Lease | None = N
     """Check the rights of a command's sender."""
     try:
         client = _authorize(command, lease, clock)
-    except NoControlError as error:
+    except RefusalError as error:
         return error.reply
     return Admitted(command, msgspec.to_builtins(command), client=client)
 

@@ -67,7 +67,7 @@ class LineParameters:
         """Use a filter from now on."""
         before, idle = self.source, self._idle
         self.source = chosen.source
-        self._cycle.drives.compensate(chosen.law)
+        self._cycle.drives.law = chosen.law
         self._cycle.use(chosen.tvist, chosen.elastic)
         self._motion.motions.keep_rate()
         self._emit("shaper_changed", why=f"{chosen.tvist.name} with estimator {self.source.name}")

@@ -5,8 +5,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from tvist_controller.events import Emit
-from tvist_controller.refusal import wrong_mode
-from tvist_protocol.replies import Code, Refused
+from tvist_controller.refusal import RefusalError, missing, wrong_mode
 from tvist_protocol.simulation import SimulationStep
 
 
@@ -44,21 +43,13 @@ CLOCK = _Words(
 )
 
 
-class NoControlError(Exception):
-    """A command came from a client without the right that it needs."""
-
-    def __init__(self, code: Code, why: str, where: str = "token") -> None:
-        super().__init__(why)
-        self.reply = Refused(code=code, where=where, why=why)
-
-
 def check_token(held: Lease | None, token: str, where: str = "token", words: _Words = CONTROL) -> Lease:
-    """Return the lease, or with `CLOCK` the hold of the clock, of a token, or raise NoControlError."""
+    """Return the lease, or with `CLOCK` the hold of the clock, of a token, or raise RefusalError."""
     if held is None:
-        raise NoControlError("no_control", words.nobody, where)
+        raise RefusalError("no_control", where, words.nobody)
     if token != held.token:
         why = f"{where} is not that of {words.whose}, held by {held.client!r}"
-        raise NoControlError("stale_token", why, where)
+        raise RefusalError("stale_token", where, why)
     return held
 
 
@@ -68,9 +59,9 @@ def is_holders(lease: Lease | None, token: str | None) -> bool:
 
 
 def check_free(held: Lease | None, client: str, words: _Words = CONTROL) -> None:
-    """Raise NoControlError if another client has control, or the clock."""
+    """Raise RefusalError if another client has control, or the clock."""
     if held is not None and held.client != client:
-        raise NoControlError("no_control", words.taken.format(held.client), words.where)
+        raise RefusalError("no_control", words.where, words.taken.format(held.client))
 
 
 def may_step(clock: Lease | None, lease: Lease | None, token: str) -> bool:
@@ -79,23 +70,22 @@ def may_step(clock: Lease | None, lease: Lease | None, token: str) -> bool:
 
 
 def check_step_token(clock: Lease | None, lease: Lease | None, token: str) -> str:
-    """Return the client of a token; raise NoControlError if it may not advance time."""
+    """Return the client of a token; raise RefusalError if it may not advance time."""
     if clock is None:
         return check_token(lease, token).client
     if is_holders(lease, token):
         why = f"the clock is held by {clock.client!r}: a client with control cannot step until the clock is released"
-        raise NoControlError("no_control", why)
+        raise RefusalError("no_control", "token", why)
     return check_token(clock, token, words=CLOCK).client
 
 
 def check_step(clock: Lease | None, lease: Lease | None, step: SimulationStep) -> str:
-    """Return the client that steps; raise NoControlError if it may not step or send its set-points."""
+    """Return the client that steps; raise RefusalError if it may not step or send its set-points."""
     client = check_step_token(clock, lease, step.token)
     if step.motion_token is not None:
         check_token(lease, step.motion_token, "motion_token")
     elif step.setpoints and clock is not None:
-        why = "motion_token is missing: set-points need control, and the clock's token does not give it"
-        raise NoControlError("missing_field", why, "motion_token")
+        raise missing("motion_token", "set-points need control, and the clock's token does not give it")
     return client
 
 
@@ -129,12 +119,12 @@ class Authority:
         self.clock: Lease | None = None
 
     def take(self, client: str, seconds: float, now: float, session: str | None = None) -> Lease:
-        """Give control to a client for its session (None: unknown), or raise NoControlError if another has it."""
+        """Give control to a client for its session (None: unknown), or raise RefusalError if another has it."""
         check_free(self.lease, client)
         return self._grant(client, seconds, now, session)
 
     def renew(self, token: str, now: float) -> Lease:
-        """Renew a token's lease; raise NoControlError as `check_token`."""
+        """Renew a token's lease; raise RefusalError as `check_token`."""
         lease = check_token(self.lease, token)
         self._ends = now + lease.seconds
         return lease
@@ -178,7 +168,7 @@ class Authority:
         self._interrupt(why)
 
     def take_clock(self, client: str, session: str | None = None) -> str:
-        """Give the clock to a client and return a new token; raise NoControlError if another holds it."""
+        """Give the clock to a client and return a new token; raise RefusalError if another holds it."""
         self._check_steppable()
         check_free(self.clock, client, CLOCK)
         self._granted_clocks += 1
@@ -187,12 +177,12 @@ class Authority:
         return self.clock.token
 
     def release_clock(self, token: str) -> None:
-        """Release the clock; raise NoControlError as `check_token`."""
+        """Release the clock; raise RefusalError as `check_token`."""
         check_token(self.clock, token, words=CLOCK)
         self.clock = None
 
     def check_step(self, step: SimulationStep, now: float) -> None:
-        """Check a step's rights; raise NoControlError without them, RefusalError in real time."""
+        """Check a step's rights; raise RefusalError without them or in real time."""
         check_step(self.clock, self.lease, step)
         if self.clock is None:
             self.renew(step.token, now)
@@ -229,12 +219,13 @@ class Presence:
         return session in self._sessions.get(client, ())
 
     def session_of(self, client: str) -> str | None:
-        """Return the session of a client, None without one; raise NoControlError if several sessions use the name."""
+        """Return the session of a client, None without one; raise RefusalError if several sessions use the name."""
         there = self._sessions.get(client, set())
         if len(there) > 1:
-            why = (
+            raise RefusalError(
+                "no_control",
+                "client",
                 f"{len(there)} programs are connected as {client!r}, and the server cannot tell which of them sent "
-                "this: give each its own name; a program that has lost its connection is forgotten within about 10 s"
+                "this: give each its own name; a program that has lost its connection is forgotten within about 10 s",
             )
-            raise NoControlError("no_control", why, "client")
         return next(iter(there), None)

@@ -50,8 +50,7 @@ class StreamGuard(Guard):
 
     def __call__(self, state: Target) -> JointStop | None:
         """Return the stop to use if a reference that leads to this state must not be played, else None."""
-        found = self._permitted(state)
-        if found is None:
+        if (found := self._permitted(state)) is None:
             return self.fallback()
         self._before = state, found
         return None
@@ -84,8 +83,7 @@ class StreamGuard(Guard):
         way = CheckedMotion(
             lambda share: stop.at(share * stop.duration)[0], _fastest(qd, qdd, stop.jerk) * stop.duration
         )
-        found = self._collisions.on_way(way, before=before)
-        if found is None:
+        if (found := self._collisions.on_way(way, before=before)) is None:
             return True
         self.met = found[1]
         self.obstacle = Obstacle(str(self.met), "collision")
@@ -163,8 +161,7 @@ class RemainingMotion:
         """Return time [s] and largest joint angle [rad] until rest, by `plan` if given; None if too far ahead."""
         if plan is not None:
             return plan.duration, plan.way
-        ahead = self._stopper.foresee()
-        if ahead is None:
+        if (ahead := self._stopper.foresee()) is None:
             return None, None
         return max(resting_after(ahead) - 1, 0) * PERIOD, float(np.abs(ahead[-1] - ahead[1]).max())
 

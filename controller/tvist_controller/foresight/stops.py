@@ -118,8 +118,7 @@ class StopPlanner:
         do, and need not be `certain`.
         """
         speed, rise = forecast.path.forwards(state.qd), forecast.path.forwards(state.qdd)
-        hardest = self._keeping(state, forecast, self.highest)
-        if hardest is None:
+        if (hardest := self._keeping(state, forecast, self.highest)) is None:
             return None
         in_time = forecast.steady + COUNTED * max(speed, 0.0) / forecast.braking
         # A very slow motion may turn back a little; braking with a stop's jerk may end as soon as the stop; and a

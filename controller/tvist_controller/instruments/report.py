@@ -139,8 +139,7 @@ def truth_message(plant: Plant, tick: int, modes: dict[str, list[float]]) -> Tru
 
 def truth_of(plant: Plant) -> PlantTruth:
     """Return what a real robot cannot measure; raise ValueError if the plant does not provide it."""
-    truth = plant.truth()
-    if truth is None:
+    if (truth := plant.truth()) is None:
         raise ValueError(
             f"truth is on, but the plant {type(plant).__name__} cannot report it: turn truth off"
         )

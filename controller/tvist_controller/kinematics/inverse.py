@@ -19,6 +19,7 @@ ON_CURVE = 4
 """Added to these if a joint is free and a curve of postures was searched, which takes many times longer."""
 
 SAMPLES = 96  # values of a free angle at which postures are computed before the nearest are refined
+SPREAD = (53, 59)  # order of those of the second and third angle; any two angles then fill a square evenly
 
 OUTSIDE = 1e6  # Penalty on the squared distance of a posture outside a joint's range [rad^2]
 
@@ -44,7 +45,7 @@ def all_postures(
     table: Floats,  # result, shape (8, 6) at least [rad]; rows without posture begin with NaN
 ) -> int:
     """Compute all postures as `postures` does; if they form a curve, those nearest to `near`."""
-    freedom = postures(arm, rotation, position, 0.0, table)
+    freedom = postures(arm, rotation, position, (0.0, 0.0, 0.0), table)
     if freedom == FREE:
         _sample_curves(arm, chain, rotation, position, near, table)
     return freedom
@@ -54,12 +55,17 @@ def all_postures(
 def _sample_curves(
     arm: Floats, chain: Floats, rotation: Floats, position: Floats, near: Floats, table: Floats
 ) -> None:
-    """Sample the free angle, then move the nearest posture of each kind along its curve."""
+    """Sample the free angles, then move the nearest posture of each kind along its curve."""
     sample, least = np.empty((8, 6)), np.empty(8)
     for row in range(8):
         table[row, 0], least[row] = math.nan, math.inf
     for number in range(SAMPLES):
-        postures(arm, rotation, position, 2.0 * math.pi * number / SAMPLES, sample)
+        free = (
+            2.0 * math.pi * number / SAMPLES,
+            2.0 * math.pi * (SPREAD[0] * number % SAMPLES) / SAMPLES,
+            2.0 * math.pi * (SPREAD[1] * number % SAMPLES) / SAMPLES,
+        )
+        postures(arm, rotation, position, free, sample)
         for row in range(8):
             if math.isnan(sample[row, 0]):
                 continue
@@ -195,8 +201,8 @@ class InverseKinematics:
         """Return the posture nearest to `near` (Euclidean, in joint space) with this pose of the flange.
 
         Each joint's turn count is the nearest in its range. If sin q₅ = 0 or another joint is free, the
-        nearest posture of that curve is returned. The pose is accurate to 1e-9 m and 1e-9 rad. Raise
-        InverseKinematicsError if no posture is in range.
+        nearest posture of that curve is returned; if two are free, a nearer one may be missed. The pose is
+        accurate to 1e-9 m and 1e-9 rad. Raise InverseKinematicsError if no posture is in range.
         """
         # Same memory layout, so that kernels are compiled only once.
         rotation, position, near = (np.array(given, float, order="C") for given in (rotation, position, near))

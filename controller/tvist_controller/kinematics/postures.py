@@ -9,9 +9,9 @@ Axis 1 turns a plane in which upper arm and forearm move; its fixed distance fro
 In the plane the triangle of upper arm and forearm has two forms, and the wrist two postures, q₅ and -q₅: up to eight in
 all. All angles come from atan2, so rounding errors of the pose are not amplified, even near singularities.
 
-If axes coincide, a joint is free and the postures form a curve. Its parameter is q₁ if the wrist centre is on axis 1;
-the direction of frame 4 in the plane (UR, axes 4 and 6 parallel) or q₄ (spherical wrist) if sin q₅ = 0; q₂ if the wrist
-is on axis 2.
+If axes coincide, a joint is free and the postures form a curve; or two are and they form a surface. The parameters are
+q₁ if the wrist centre is on axis 1; the direction of frame 4 in the plane (UR, axes 4 and 6 parallel) or q₄ (spherical
+wrist) if sin q₅ = 0; q₂ if the wrist is on axis 2.
 """
 
 import math
@@ -140,7 +140,7 @@ def postures(
     arm: Floats,  # see `arm_table`, of one of the two forms
     rotation: Floats,  # of the flange, like its position
     position: Floats,
-    free: float,  # value of an angle that is free, if there is one [rad]
+    free: Vector,  # values of q₁, the wrist's angle and q₂ where these are free [rad]
     table: Floats,  # result [rad], shape (8, 6) at least, in any representation
 ) -> int:
     """Compute all postures at a pose; return the largest of DEFINITE, LOOSE and FREE that applies.
@@ -173,7 +173,7 @@ def postures(
     turns = freedom == FREE
     for shoulder in range(2):
         if turns:
-            q1 = free + math.pi * shoulder
+            q1 = free[0] + math.pi * shoulder
             c, s = math.cos(q1), math.sin(q1)
         else:
             c = (along * px - distance * py) / (radius * radius)
@@ -189,13 +189,13 @@ def postures(
         if parallel:
             freedom = max(freedom, _parallel(arm, q1, pose, free, rows))
         else:
-            freedom = max(freedom, _spherical(arm, q1, pose, free, rows))
+            freedom = max(freedom, _spherical(arm, q1, pose, turns, free, rows))
         along = -along
     return freedom
 
 
 @inlined
-def _parallel(arm: Floats, q1: float, pose: tuple[Point, Vector, Vector], free: float, rows: Floats) -> int:
+def _parallel(arm: Floats, q1: float, pose: tuple[Point, Vector, Vector], free: Vector, rows: Floats) -> int:
     """Compute the four postures of a UR arm at one shoulder position."""
     (px, py), (xx, xy, xu), (zx, zy, zu) = pose
     e2 = arm[1, 2]
@@ -208,7 +208,7 @@ def _parallel(arm: Floats, q1: float, pose: tuple[Point, Vector, Vector], free: 
     slack = AT_BORDER
     if straight:
         q5 = 0.0 if c5 > 0.0 else math.pi
-        hx, hy, sine = math.cos(free), math.sin(free), 0.0
+        hx, hy, sine = math.cos(free[1]), math.sin(free[1]), 0.0
     else:
         q5 = math.atan2(sine, c5)
         hx, hy = s5 * zx / sine, s5 * zy / sine
@@ -219,7 +219,7 @@ def _parallel(arm: Floats, q1: float, pose: tuple[Point, Vector, Vector], free: 
     wx = arm[4, 1] * s4 * hy + arm[3, 0] * hx
     wy = -arm[4, 1] * s4 * hx + arm[3, 0] * hy
     for wrist in range(1 if straight else 2):
-        ways, triangle = elbow(arm[1, 0], arm[6, 1], px - wx, py - wy, slack, free)
+        ways, triangle = elbow(arm[1, 0], arm[6, 1], px - wx, py - wy, slack, free[2])
         freedom = max(freedom, triangle)
         for way in range(2):
             theta2, delta = ways[2 * way], ways[2 * way + 1]
@@ -235,11 +235,13 @@ def _parallel(arm: Floats, q1: float, pose: tuple[Point, Vector, Vector], free: 
 
 
 @inlined
-def _spherical(arm: Floats, q1: float, pose: tuple[Point, Vector, Vector], free: float, rows: Floats) -> int:
+def _spherical(
+    arm: Floats, q1: float, pose: tuple[Point, Vector, Vector], turns: bool, free: Vector, rows: Floats
+) -> int:
     """Compute the four postures of an arm with a spherical wrist at one shoulder position."""
     (px, py), (xx, xy, xu), (zx, zy, zu) = pose
     e2, s3, s4, s5 = arm[1, 2], arm[2, 3], arm[3, 3], arm[4, 3]
-    ways, freedom = elbow(arm[1, 0], arm[6, 1], px, py, AT_BORDER, free)
+    ways, freedom = elbow(arm[1, 0], arm[6, 1], px, py, AT_BORDER, free[2])
     for way in range(2):
         theta2, delta = ways[2 * way], ways[2 * way + 1]
         if math.isnan(theta2):
@@ -253,11 +255,12 @@ def _spherical(arm: Floats, q1: float, pose: tuple[Point, Vector, Vector], free:
         c5 = -s5 * s4 * vz
         sine = math.hypot(vx, vy)
         wrist_freedom = freedom_at(sine)
+        # An elbow at its end amplifies rounding; a free axis 1 shows that the wrist is meant to be straight.
+        straight = wrist_freedom == FREE or (turns and wrist_freedom == LOOSE)
         freedom = max(freedom, wrist_freedom)
-        straight = wrist_freedom == FREE
         if straight:
-            q4, q5, sine = free, 0.0 if c5 > 0.0 else math.pi, 0.0
-            hx, hy = math.cos(free), math.sin(free)
+            q4, q5, sine = free[1], 0.0 if c5 > 0.0 else math.pi, 0.0
+            hx, hy = math.cos(free[1]), math.sin(free[1])
         else:
             q5 = math.atan2(sine, c5)
             hx, hy = s5 * vx / sine, s5 * vy / sine

@@ -55,8 +55,7 @@ class ControlCycle:
         self.drives = DriveFeedForward(
             description, compensate_sag=compensate_sag, positions=self.plant.supervised
         )  # joint controllers: from the target to the drive commands
-        self.drives.use(elastic)
-        self.drives.compensate(law)
+        self.drives.wanted, self.drives.law = elastic, law
         self.mode = LineMode.REST
         self.placements = 0  # number of times the arm was placed at rest, which interrupts its motion
         self.guard: Guard | None = None  # checks references and stops of a guarded motion; None without one
@@ -112,10 +111,10 @@ class ControlCycle:
             return self._stopped(guard, guard.give_up(str(error)))
         x_star = self.filter.filter(x) if self.mode.shaped else x
         # Check after the filter, since the arm must be able to stop from the shaped reference.
-        if self.mode.guarded and guard is not None:
-            stop = guard(self.shaped.joints.after(x_star))
-            if stop is not None:
-                return self._stopped(guard, stop)
+        if not self.mode.guarded or guard is None:
+            return x, x_star, None
+        if (stop := guard(self.shaped.joints.after(x_star))) is not None:
+            return self._stopped(guard, stop)
         return x, x_star, None
 
     def _stopped(self, guard: Guard, stop: Trajectory) -> tuple[Floats, Floats, Obstacle]:
@@ -156,7 +155,7 @@ class ControlCycle:
         During a change the new filter waits; only the latest waiting filter is kept. Without elastic
         feed-forward, the paper's is used.
         """
-        self.drives.use(elastic)
+        self.drives.wanted = elastic
         if self.mode.at_rest:  # both kinds of feed-forward are equal at rest: no fading
             self.drives.rest()
         if self.mode.at_rest or not self.mode.shaped:

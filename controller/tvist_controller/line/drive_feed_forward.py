@@ -27,12 +27,13 @@ class DriveFeedForward:
         compensate_sag: bool = False,
         positions: bool = False,
     ) -> None:
-        self._law: Floats | None = None
+        self.law: Floats | None = None
+        """Known friction (`LAWS`) to feed forward from the next rest on; None for a fraction of the description's."""
         self.rows = joint_rows(description, compensate_sag=compensate_sag, positions=positions)
         """Parameters and state of the paper's joint controllers, see `joint_controllers`."""
         self._sags = compensate_sag and not positions
         self.wanted: ElasticFeedForward | None = None
-        """Elastic feed-forward in use or next; None for the paper's."""
+        """Elastic feed-forward in use, or next after a transition; None for the paper's."""
         self._elastic: ElasticFeedForward | None = None
         self._share, self._rising = 0, False
         self._rate = 1.0 / (FADE * PERIOD)
@@ -44,21 +45,13 @@ class DriveFeedForward:
         """Delay of commands behind the paper's targets [s]."""
         return 0.0 if self.wanted is None else self.wanted.delay
 
-    def use(self, elastic: ElasticFeedForward | None) -> None:
-        """Change to elastic feed-forward, or to the paper's for None, with a transition."""
-        self.wanted = elastic
-
-    def compensate(self, law: Floats | None) -> None:
-        """Feed known friction (`LAWS`), or a fraction of the description's, forward from the next rest on."""
-        self._law = law
-
     def _rely_on_law(self) -> None:
         self.rows[LAW:] = 0.0
-        if self._law is not None:
-            self.rows[LAW : LAW + len(self._law)] = self._law
+        if self.law is not None:
+            self.rows[LAW : LAW + len(self.law)] = self.law
 
     def rest(self) -> None:
-        """Complete a transition at once if the motors do not lead either, since both kinds are then equal."""
+        """Complete a transition at once if no motor leads its joint: both kinds of feed-forward are then equal."""
         self._rely_on_law()
         if self._elastic is self.wanted and self._share == self._full:
             return

@@ -126,5 +126,4 @@ def _moved(parameters: Floats, placement: pin.SE3) -> Floats:
     turned = placement.rotation @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ placement.rotation.T
     shift = 2.0 * (p @ h) * np.eye(3) - np.outer(p, h) - np.outer(h, p)
     inertia = turned + shift + mass * (p @ p * np.eye(3) - np.outer(p, p))
-    moved = inertia[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]
-    return np.concatenate([[mass], h + mass * p, moved])
+    return np.concatenate([[mass], h + mass * p, inertia[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]])

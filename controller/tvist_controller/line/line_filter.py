@@ -57,8 +57,7 @@ class LineFilter:
 
     def filter(self, reference: Floats) -> Floats:
         """Return the shaped sample, also within a transition."""
-        fade = self._fade
-        if fade is None:
+        if (fade := self._fade) is None:
             return self.tvist.filter(reference)
         shaped = fade.filter(reference)
         if (

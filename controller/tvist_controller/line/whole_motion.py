@@ -47,8 +47,8 @@ class DrivenLine:
     ) -> Driven:
         """Compute the drive commands for a shaped reference, from rest."""
         drives = self._drives
-        drives.compensate(self._law if law is None else law)
-        drives.use(elastic)
+        drives.wanted = elastic
+        drives.law = self._law if law is None else law
         drives.reset(self._dynamics.gravity(start))
         _, rest = self._tick(start, start, start)
         whole = np.empty((ticks, len(start)))

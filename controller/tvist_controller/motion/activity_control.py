@@ -155,8 +155,7 @@ class MotionControl:
 
     def check(self, trigger: str) -> Activity:
         """Return the activity that a trigger leads to, or raise RefusalError if it is not allowed now."""
-        target = after(self.activity, trigger)
-        if target is None:
+        if (target := after(self.activity, trigger)) is None:
             raise out_of_turn(trigger, self.activity)
         self.safety.check(trigger, self.activity)
         if target.moving and not (self._moving or self.ready):
@@ -191,12 +190,10 @@ class MotionControl:
 
     def end_stream(self) -> None:
         """Bring the stream to rest through the filter; raise RefusalError if none runs."""
-        stream = self.streams.stream
-        if stream is None:
+        if (stream := self.streams.stream) is None:
             raise out_of_turn("servo_stop", self.activity)
         end = stream.end
-        met = self.ahead.after_stream(end)
-        if met is not None:
+        if (met := self.ahead.after_stream(end)) is not None:
             self.interrupt(f"{met} before the stream came to rest through the filter", "collision")
             return
         self.go("servo_stop")
@@ -222,8 +219,7 @@ class MotionControl:
         category: int = 2,
     ) -> None:
         """Carry out a trigger's transition, if any, and stop motion; an event of `kind` reports the stop."""
-        target = after(self.activity, trigger)
-        if target is None:
+        if (target := after(self.activity, trigger)) is None:
             return
         self.activity = target
         plan = None if self.cycle.mode.at_rest else self.stopper.stop(deceleration)
@@ -260,8 +256,7 @@ class MotionControl:
 
     def watch(self, now: float) -> None:
         """End a stream without new set-points."""
-        silence = self.streams.silence(now)
-        if silence is not None:
+        if (silence := self.streams.silence(now)) is not None:
             self.interrupt(silence)
 
     def step(self, wrench: Floats | None = None) -> Sample:
@@ -274,11 +269,10 @@ class MotionControl:
         if sample.refused is not None and interrupted is not None:
             self.activity = interrupted
             self.tell_end(None, *sample.refused)
-        if self._moving and self.cycle.mode.at_rest and (target := after(self.activity, "at_rest")):
-            goes_on = self.activity is Activity.MOVING and self.motions.go_on()
-            if not goes_on:
-                self.activity = target
-                self.motions.done()
+        target = after(self.activity, "at_rest") if self._moving and self.cycle.mode.at_rest else None
+        if target is not None and not (self.activity is Activity.MOVING and self.motions.go_on()):
+            self.activity = target
+            self.motions.done()
         return sample
 
     def note(self, sample: Sample) -> None:

@@ -148,7 +148,7 @@ class ForceControl(Monitor):
         """
         if self._cycle.plant.supervised:
             raise wrong_mode(
-                "this arm follows positions with a lag, and its force is a guess: forces cannot move it"
+                "this arm follows positions late and only estimates its forces: use force mode at its own controller"
             )
         self.check_sensor()
         self._guidance.check(trigger)
@@ -224,8 +224,7 @@ class ForceControl(Monitor):
             self._beyond, self.awake = 0, False
             return None
         self.awake = True
-        changed = self._follow_source(self._source_of(sample))
-        if changed is not None:
+        if (changed := self._follow_source(self._source_of(sample))) is not None:
             return changed
         pressed = [
             self._forces.unexplained(sample, wrench, zeroed=wrench is sample.wrench)
@@ -322,5 +321,4 @@ def _turned_to(axes: Floats, direction: Floats) -> Floats:
     length = np.linalg.norm(direction)
     if length < FRAME_DEADBAND:
         return axes
-    turn_y = pin.Quaternion.FromTwoVectors(axes[:, 1], direction / length)
-    return np.asarray(turn_y.matrix() @ axes)
+    return np.asarray(pin.Quaternion.FromTwoVectors(axes[:, 1], direction / length).matrix() @ axes)

@@ -75,10 +75,6 @@ class Setpoints:
     def counters(self) -> tuple[int, int, int]:
         """Return counts of late, lost and limited set-points since the start."""
         late, lost, limited = self._ended
-        if self.stream is not None:
-            late, lost, limited = (
-                late + self.stream.late,
-                lost + self.stream.lost,
-                limited + self.stream.limited,
-            )
-        return late, lost, limited
+        if (stream := self.stream) is None:
+            return self._ended
+        return late + stream.late, lost + stream.lost, limited + stream.limited

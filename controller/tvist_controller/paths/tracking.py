@@ -78,8 +78,7 @@ class Tracker:
         try:
             last = self._knot(curve, end, guess)
             c = hermite(length, start[1:], last[1:])
-            q = (0.5 * length) ** np.arange(6) @ c
-            goal, found = curve.at(middle).pose, self.pose(q)
+            goal, found = curve.at(middle).pose, self.pose((0.5 * length) ** np.arange(6) @ c)
             off = max(
                 float(np.abs(goal.position - found.position).max()),
                 float(np.abs(turn(found.rotation, goal.rotation)).max()),

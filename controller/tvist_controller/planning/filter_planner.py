@@ -231,7 +231,7 @@ def _calibration(command: SetEstimator, setup: Setup) -> Calibration:
             return found.calibration
     if command.calibration is None or (own is not None and own.name == command.calibration):
         if own is None:
-            raise missing("calibration", "this server was started without one")
+            raise missing("calibration", "give one, since this server was started without")
         return own
     if command.calibration not in available():
         must = f"one of {', '.join(available())}"

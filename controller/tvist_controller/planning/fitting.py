@@ -91,8 +91,7 @@ class Fitter:
         asked, need, slower = make(AS_ASKED), None, AS_ASKED
         motion = asked
         for number in itertools.count():
-            found = self._need(motion, now, tvist)
-            if found is None:
+            if (found := self._need(motion, now, tvist)) is None:
                 break
             if found.exceeds is not None:
                 return Fitted(asked, limited=("limit_torque", found.exceeds))
@@ -219,8 +218,7 @@ def keeping_motion(
         motion = quickest_motion(path, spared, speed, agility)
         if easy:
             break
-        ahead = shaped_ahead(motion, tvist)
-        if ahead is None:
+        if (ahead := shaped_ahead(motion, tvist)) is None:
             break
         most = float(np.abs(np.diff(ahead, 2, axis=0)).max(initial=0.0)) / PERIOD**2
         if most <= limits.acceleration:

@@ -80,8 +80,7 @@ class MovePlanner(Fitter):
             motion, slower, limited, _ = self.fit(make, now, tvist, limits if agility is None else None)
         except ValueError as error:
             raise RefusalError("out_of_range", "velocity", str(error)) from error
-        found = self.meeting(path.whole, now)
-        if found is not None:
+        if (found := self.meeting(path.whole, now)) is not None:
             share, meeting = found
             time = motion.time_at(share)
             raise RefusalError("collision", "q", f"{meeting} {time:.2f} s after the start", CLEARANCE)

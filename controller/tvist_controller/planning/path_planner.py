@@ -94,8 +94,7 @@ class PathPlanner:
         """Plan the extension of a motion to further legs; None if its end is too near."""
         before, tvist = now.after, self._filters.like(now.filter)
         assert before is not None
-        found = before.branch(now.until)
-        if found is None:
+        if (found := before.branch(now.until)) is None:
             return None
         cuts, branch = found
         route = self._route([*branch.legs, *legs], tracker, now, branch)
@@ -134,8 +133,7 @@ class PathPlanner:
         self, way: CheckedMotion, run: Run, part: tuple[float, float], now: PlanningState
     ) -> None:
         """Refuse a path with a collision; `part` is the start on the whole path and the latter's length."""
-        found = self._moves.meeting(way, now)
-        if found is None:
+        if (found := self._moves.meeting(way, now)) is None:
             return
         share, meeting = found
         covered, where = share * length_of(run), run[-1].where
@@ -200,8 +198,7 @@ class PathPlanner:
 
     @staticmethod
     def _planned(curve: SplineCurve, law: RetimedLaw, rate: float) -> PlannedMotion:
-        agility = at_least(law.limits, AGILE.acceleration, AGILE.jerk)
-        return PlannedMotion(curve, law, rate, agility)
+        return PlannedMotion(curve, law, rate, at_least(law.limits, AGILE.acceleration, AGILE.jerk))
 
     @staticmethod
     def _delay(curve: SplineCurve, tvist: Filter) -> float:
@@ -263,8 +260,7 @@ def marks_of(runs: list[Run], segments: range, start: float = 0.0) -> tuple[tupl
     """Return where each segment's end blend begins, see `PlannedMove.marks`; the first run starts at `start` [m]."""
     marks = dict[int, tuple[int, float]]()
     for part, run in enumerate(runs):
-        lengths = [piece.knots.s[-1] for piece in run]
-        ends = ((0.0 if part else start) + np.cumsum(lengths)).tolist()
+        ends = ((0.0 if part else start) + np.cumsum([piece.knots.s[-1] for piece in run])).tolist()
         for number, piece in enumerate(run):
             # Before another segment, the last piece is the blend.
             last = run[-1].where == piece.where

@@ -96,8 +96,7 @@ class Plans:
 
     def hold(self, plan: Plan) -> bool:
         """Return whether a plan is still valid in the present state."""
-        goes_on = plan.state.get("after") is not None
-        now = self._snapshot(0.0 if goes_on else None)
+        now = self._snapshot(0.0 if plan.state.get("after") is not None else None)
         return plan.until >= now.until and all(
             _same(value, getattr(now, name)) for name, value in plan.state.items()
         )
@@ -135,8 +134,8 @@ class CommandRow(NamedTuple):
 
     message: type[Command]
     handle: Callable[[Any, CommandCall[Any]], Reply | None]
-    """Carries out a checked command on a `Robot`. Raises `RefusalError` or `NoControlError` before any
-    change; None means the reply `Done`."""
+    """Carries out a checked command on a `Robot`. Raises `RefusalError` before any change; None means the
+    reply `Done`."""
     lease: Literal["needed", "if named", "none"] = "needed"
     """When the command's token must be that of the lease: always, if present, or never, because it has
     another meaning."""

@@ -55,8 +55,7 @@ class ProgramArm:
     def follow(self, segment: Segment) -> Turns:
         """Move along a part of a path; if it blends into the next, the program continues meanwhile."""
         self._check_alone()
-        moves = self._present()
-        if moves is None:
+        if (moves := self._present()) is None:
             moves = BlendedMoves(self._access, self._thread(), self._rate_limit, self._come_to_rest)
             self._blended[self._thread()] = moves
         moves.add(segment)
@@ -74,8 +73,7 @@ class ProgramArm:
 
     def finish(self) -> Turns:
         """Complete this thread's moves without another blend."""
-        moves = self._present()
-        if moves is not None:
+        if (moves := self._present()) is not None:
             moves.closed = True
             yield from self._carry_out(moves)
 
@@ -123,8 +121,7 @@ class ProgramArm:
 
     def then(self, effect: Callable[[], None]) -> None:
         """Do something now, or at the start of the blend after this thread's last waiting move."""
-        moves = self._present()
-        if moves is None:
+        if (moves := self._present()) is None:
             effect()
         else:
             moves.then(effect)
@@ -240,8 +237,7 @@ class ProgramArm:
 
     def abort(self) -> None:
         """Stop the program's present planned move, if any, and continue as if it had ended."""
-        moves = self._current
-        if moves is None:
+        if (moves := self._current) is None:
             return
         moves.skipped = True
         if moves.number is not None:

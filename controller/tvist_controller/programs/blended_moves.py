@@ -2,6 +2,8 @@
 
 from collections.abc import Callable, Generator
 
+from msgspec.structs import asdict
+
 from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.planning.move_planner import PlannedMove
 from tvist_controller.planning.plan import Plan
@@ -263,22 +265,8 @@ class BlendedMoves:
 
 def command_of(legs: list[Segment], *, goes_on: bool = False) -> MoveJ | MoveL | MovePath:
     """Return the simplest command for moves blended into one motion; only a path can be extended."""
-    token = OWN_TOKEN
-    match [] if goes_on else legs:
-        case [JointSegment() as leg]:
-            return MoveJ(
-                token=token,
-                q=leg.q,
-                velocity=leg.velocity,
-                acceleration=leg.acceleration,
-                duration=leg.duration,
-            )
-        case [LineSegment() as leg]:
-            return MoveL(
-                token=token,
-                pose=leg.pose,
-                velocity=leg.velocity,
-                acceleration=leg.acceleration,
-                duration=leg.duration,
-            )
-    return MovePath(token=token, segments=tuple(legs))
+    first = legs[0]
+    if goes_on or len(legs) > 1 or not isinstance(first, JointSegment | LineSegment):
+        return MovePath(token=OWN_TOKEN, segments=tuple(legs))
+    fields = {name: value for name, value in asdict(first).items() if name != "blend"}
+    return (MoveJ if isinstance(first, JointSegment) else MoveL)(token=OWN_TOKEN, **fields)

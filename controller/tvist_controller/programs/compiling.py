@@ -36,11 +36,9 @@ class ScriptCompiler:
 
     def compile(self, command: ProgramLoad | ProgramRun) -> Script | None:
         """Return the program of a command; None without a text or built-in program."""
-        text = command.text
-        if text is None:
+        if (text := command.text) is None:
             assert isinstance(command, ProgramLoad)
-            text = self._built_in.get(command.name)
-            if text is None:
+            if (text := self._built_in.get(command.name)) is None:
                 return None
         return self._compile(text)
 

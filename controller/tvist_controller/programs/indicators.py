@@ -149,8 +149,7 @@ class Watchdogs:
 
 def _register(name: str) -> tuple[Bank, int]:
     """Return bank and number of a register by RTDE's name."""
-    match = _NAME.fullmatch(name)
-    if match is None:
+    if (match := _NAME.fullmatch(name)) is None:
         raise Fault(f'"{name}" is no input register: it must be like "input_int_register_0"')
     kind, place, first, _ = match.groups()
     if first is not None:

@@ -223,12 +223,10 @@ class Sockets:
         time pass: on timeout, or if the socket was closed before. The timeout [s] counts robot time, but at least as
         much wall time; none if not above 0. `meanwhile` is called with the ticks passed before each further tick.
         """
-        socket = self._named.get((self._owner(), name))
-        if socket is None:
+        if (socket := self._named.get((self._owner(), name))) is None:
             yield
             return None
-        found = self._take(socket, take)
-        if found is not None:
+        if (found := self._take(socket, take)) is not None:
             return found[0]
         last = ceil(timeout / PERIOD - 1e-9)
         waited = 0
@@ -236,8 +234,7 @@ class Sockets:
             while True:
                 yield
                 waited += 1
-                found = self._take(socket, take)
-                if found is not None:
+                if (found := self._take(socket, take)) is not None:
                     return found[0]
                 if not socket.open or self._waits[wait]:
                     return None

@@ -21,8 +21,7 @@ from tvist_protocol.simulation import SimulationInject
 def check_fault(command: SimulationInject, description: RobotDescription) -> None:
     """Refuse a fault that this robot can never have."""
     joints = description.joints
-    fault = FAULTS.get(command.fault)
-    if fault is None:
+    if (fault := FAULTS.get(command.fault)) is None:
         raise invalid("fault", repr(command.fault), f"one of {', '.join(FAULTS)}", code="unknown_fault")
     for field in ("joint", "value", "seconds"):
         given = getattr(command, field) is not None

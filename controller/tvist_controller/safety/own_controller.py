@@ -56,8 +56,7 @@ class RemoteStatus:
 
     def io(self, io: Io, *, force: bool) -> Io:
         """Return `io` with the robot's own values, and its tool force if wanted."""
-        sight = self._sight
-        if sight is None:
+        if (sight := self._sight) is None:
             return io
         given = {
             "payload": self.declared(io.payload),

@@ -138,8 +138,7 @@ class PayloadLearning:
         def study() -> None:
             try:
                 motion = ended.record()
-                lesson = self._study(motion)
-                if lesson is not None:
+                if (lesson := self._study(motion)) is not None:
                     plan = None if self._plan is None else self._plan(lesson, motion.beliefs)
                     learnt.append(LessonRecord(motion.beliefs, lesson, plan))
             except Exception as error:  # noqa: BLE001  the robot goes on without the lesson, and `raised` reports it

@@ -37,8 +37,7 @@ class RobotModes:
         self._motion.changed = True
         if event.kind not in {"protective_stop", "safety_stop"}:
             return
-        cause = _cause(event, self._motion.safety_mode)
-        if cause is not None:
+        if (cause := _cause(event, self._motion.safety_mode)) is not None:
             self.stops.pop(cause, None)  # moves the newest to the end
             self.stops[cause] = event
 

@@ -161,8 +161,7 @@ class SafetyControl:
                 or (monitor.needs == "drives alone" and isinstance(motion.cycle.trajectory, Compliant))
             ):
                 continue
-            found = monitor.look(sample)
-            if found is None:
+            if (found := monitor.look(sample)) is None:
                 continue
             if found.then == "protective_stop":
                 motion.protect(found.why, found.code)

@@ -43,8 +43,7 @@ def run_file(place: str, kind: str, may_be_one: Callable[[object], bool]) -> Own
 
     If the name is missing, the message lists those that may be meant.
     """
-    named = _FILE.fullmatch(place)
-    if named is None:
+    if (named := _FILE.fullmatch(place)) is None:
         raise OwnFileError(
             f"{kind} is {place!r}: must be FILE.py:NAME, a Python file and the name of a {kind} in that file"
         )

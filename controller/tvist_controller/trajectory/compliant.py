@@ -59,8 +59,7 @@ def compliant_velocity(task: ForceTask, velocity: Floats, felt: Floats) -> Float
     moved = (velocity + PERIOD * push) / (1.0 + PERIOD * damping / task.mass)
     moved = np.clip(moved, -task.limits, task.limits)
     most = PERIOD * np.repeat(RELEASE, 3)
-    released = velocity - np.clip(velocity, -most, most)
-    return np.where(task.compliant > 0.0, moved, released)
+    return np.where(task.compliant > 0.0, moved, velocity - np.clip(velocity, -most, most))
 
 
 class Compliant(LimitedFollower):
@@ -181,8 +180,7 @@ class Compliant(LimitedFollower):
             return self._moved
         rotation, position = self._nominal
         self._nominal = there = self.kinematics.pose(self.inner.next())
-        way = np.concatenate((there[1] - position, turn(rotation, there[0])))
-        self._moved = way / PERIOD
+        self._moved = np.concatenate((there[1] - position, turn(rotation, there[0]))) / PERIOD
         return self._moved
 
     def _shifted(self, pose: tuple[Floats, Floats], way: Floats) -> tuple[Floats, Floats]:
@@ -194,8 +192,7 @@ class Compliant(LimitedFollower):
         off = np.concatenate((self._pose[1] - position, turn(rotation, self._pose[0])))
         lost = np.where(self.task.compliant > 0.0, _into(axes, off), 0.0)
         self._pose = self._shifted(self._pose, -_out(axes, lost))
-        kept = np.where(self.task.compliant > 0.0, 0.0, _into(axes, self._given))
-        self._given = _out(axes, kept)
+        self._given = _out(axes, np.where(self.task.compliant > 0.0, 0.0, _into(axes, self._given)))
 
 
 def _into(axes: Floats, base: Floats) -> Floats:

@@ -211,11 +211,9 @@ class Limiter:
         # Shortest stop from zero acceleration, plus or minus the distance between its start and the present state.
         top = speed + 0.5 * jerk * ramp**2
         gentle = top < limit**2 / jerk
-        swing = top / limit + limit / jerk
-        stop = top * np.where(gentle, np.sqrt(top / jerk), 0.5 * swing)
+        stop = top * np.where(gentle, np.sqrt(top / jerk), 0.5 * (top / limit + limit / jerk))
         rising = speed * ramp + jerk * ramp**3 / 3.0
-        falling = top * ramp - jerk * ramp**3 / 6.0
-        way = stop + np.where(rise > 0.0, rising, -falling)
+        way = stop + np.where(rise > 0.0, rising, -(top * ramp - jerk * ramp**3 / 6.0))
         way = np.where((rise < 0.0) & (speed <= 0.5 * jerk * ramp**2), speed * ramp, way)
         inside: Bools = sign * q + way + 2.0 * PERIOD * speed <= self._reach
         inside |= sign * q <= sign * self.q
@@ -285,8 +283,7 @@ class Limiter:
         request.current_position, request.current_velocity = present[0].tolist(), present[1].tolist()
         request.current_acceleration = present[2].tolist()
         request.target_velocity, request.max_acceleration = qd.tolist(), [limit] * len(qd)
-        state = _after_a_tick(self._brake, request)
-        if state is None:
+        if (state := _after_a_tick(self._brake, request)) is None:
             q, qd, qdd = present
             state = np.stack((q + h * (qd + 0.5 * h * qdd), qd + h * qdd, qdd))
         return state

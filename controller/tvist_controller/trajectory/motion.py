@@ -72,8 +72,7 @@ class TimeScaling:
     def _room(self, qd: Floats, qdd: Floats) -> tuple[float, float]:
         """Return the range of ṙ that keeps every joint within its acceleration [1/s]."""
         lowest, highest = -QUICKEST, QUICKEST
-        own = qdd * self.rate**2
-        for velocity, acceleration in zip(qd.tolist(), own.tolist(), strict=True):
+        for velocity, acceleration in zip(qd.tolist(), (qdd * self.rate**2).tolist(), strict=True):
             if abs(velocity) < 1e-9:
                 continue
             ends = sorted((sign * self.acceleration - acceleration) / velocity for sign in (-1.0, 1.0))
@@ -186,8 +185,7 @@ class PlannedMotion(Trajectory):
             most, ends = self.agility.acceleration, (time, time + LOOK_AHEAD * PERIOD)
             states = (np.array(self.law.at(end)) for end in ends)
             curve = [self.path.paced(x, xd, xdd, most) for x, xd, xdd in states]
-            step = self._pace.advance(self.speed, curve)
-            self._since, self._ticks = time + step, 0
+            self._since, self._ticks = time + self._pace.advance(self.speed, curve), 0
         time = self.time
         return self.path.end if time >= self.duration else np.array(self.law.at(time)[0])
 

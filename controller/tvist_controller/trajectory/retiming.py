@@ -256,9 +256,9 @@ def longer_law(
 def _lastingly(way: RetimingLimits, b: Floats, ramp: float, window: float, known: Floats) -> Floats:
     """Return the largest ṡ² at the edges within windowed limits; `b` is that without window.
 
-    A faster motion comes farther within the window, so more limits apply. Planning on the times of a faster
-    motion is too slow, on the times of that too fast, and on the times of the latter in between, which keeps
-    the limits of its own times.
+    The limits of all cells within the window apply, and a faster motion passes more cells. Each round uses the times of
+    the motion before it: the first motion becomes slower than necessary, the second too fast, and the third one lies in
+    between and keeps the limits of its own times.
     """
     around = window + ramp
     for _ in range(ROUNDS):

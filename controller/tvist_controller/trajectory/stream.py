@@ -44,8 +44,7 @@ class SetpointStream(LimitedFollower):
         reach = np.full(len(q), np.inf) if reach is None else reach
         super().__init__((self._rest, still, still), limits, reach, torque)
         self._ticks = max(round(stream_period / PERIOD, 9), 1.0)
-        direct = self._ticks == 1.0
-        self._curve, self._look_ahead = (linear, 1) if direct else (cubic, 2)
+        self._curve, self._look_ahead = (linear, 1) if self._ticks == 1.0 else (cubic, 2)
         self._play_out: PlayOut | None = None
         self._waiting: dict[int, Floats] = {}
         self._heard: list[int] = []

@@ -195,8 +195,9 @@ def test_speed_and_outputs_are_in_use_while_another_client_has_control(one, cont
 
 
 def test_reserved_inputs_are_in_use_for_every_client(one, other, robot):
-    reserved = matching(["speed_slider_*", "input_int_register_[0-9]"])
+    reserved = matching(("speed_slider_*", "input_int_register_[0-9]"))
     assert set(reserved) == {*SPEED, *ints[:10]}
+    assert matching(("speed_slider_*", "input_int_register_[0-9]")) is reserved
     robot.inputs.take(reserved, "a fieldbus")
     for client_ in (one, other):
         client_.say(client.version())

@@ -310,8 +310,7 @@ class MotionFunctions(Family):
     def _near(self) -> Sequence[float]:
         """Posture at the start of the next move."""
         here: list[float] = self._reference.tolist()
-        end = self._arm.end
-        if end is None:
+        if (end := self._arm.end) is None:
             return here
         return end.q if isinstance(end, JointSegment) else self._kinematics.posture(end.pose, here)
 

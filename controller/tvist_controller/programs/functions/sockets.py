@@ -85,8 +85,7 @@ class SocketFunctions(Family):
     @costs(10)
     def socket_read_line(self, socket_name: Name = _ONE, timeout: Number = 2) -> Generator[None, None, str]:
         """Read a line of at most 1023 bytes without its end; an empty text after the timeout."""
-        found = yield from self._read(socket_name, _line, timeout)
-        return to_text(found or b"")
+        return to_text((yield from self._read(socket_name, _line, timeout)) or b"")
 
     @costs(10)
     def socket_read_string(
@@ -113,8 +112,7 @@ class SocketFunctions(Family):
         r"""Send `GET name\n` and return the integer of the answer `name value\n`; 0 without one in 2 s."""
         yield from self._arm.finish()
         self._parts.sockets.send(socket_name, to_bytes(f"GET {name}\n"))
-        found = yield from self._read(socket_name, lambda got: _variable(got, name), ANSWER)
-        return found or 0
+        return (yield from self._read(socket_name, lambda got: _variable(got, name), ANSWER)) or 0
 
     @costs(10)
     def socket_set_var(self, name: Text, value: Int32, socket_name: Name = _ONE) -> None:
@@ -218,8 +216,7 @@ def _floats(received: bytes, number: int) -> tuple[tuple[float, ...] | None, int
 def _variable(received: bytes, name: str) -> tuple[int | None, int] | None:
     """Parse the answer to a variable request, skipping blank lines whose line feed came late."""
     begin = len(received) - len(received.lstrip(b"\r\n"))
-    found = _line(received[begin:])
-    if found is None:
+    if (found := _line(received[begin:])) is None:
         return None
     answer = _VARIABLE.fullmatch(found[0].decode("ascii", "replace"))
     if answer is None or answer[1] != name or len(answer[2]) > LONGEST_NUMBER:

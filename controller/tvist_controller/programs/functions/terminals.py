@@ -176,7 +176,10 @@ class TerminalFunctions(Family):
         if not isinstance(outputs, Array):
             raise Fault(f"outputs is {shown(outputs)}: it must be a list")
         if any(bool(item) for item in outputs.items):
-            raise Fault("set_runstate_outputs: outputs that show whether a program runs are not simulated")
+            raise Fault(
+                f"outputs is {shown(outputs)}: it must have no True; to show whether a program runs, call "
+                "set_runstate_standard_digital_output_to_value instead"
+            )
 
     def get_analog_in(self, n: AnalogPort) -> float:
         """Return an analogue input: 0 and 1 of the control box, 2 and 3 of the tool [A or V]."""

@@ -1,8 +1,8 @@
 """Names and types of input variables, which clients set, outputs, which they read, and registers."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from fnmatch import fnmatchcase
-from functools import partial
+from functools import cache, partial
 from operator import attrgetter
 from typing import Any, NamedTuple, get_args
 
@@ -75,13 +75,14 @@ NEED_CONTROL = frozenset(NAMED) - {"external_force_torque"}
 wrench serves programs of the client in control, and every connection of `ur_rtde` requests it."""
 
 
-def matching(patterns: Iterable[str]) -> list[str]:
+@cache
+def matching(patterns: tuple[str, ...]) -> tuple[str, ...]:
     """Return the input variables that match patterns with `*`, `?` and `[0-9]`; StartError if one matches none."""
     found = {pattern: [name for name in INPUTS if fnmatchcase(name, pattern)] for pattern in patterns}
     if wrong := [pattern for pattern, names in found.items() if not names]:
         why = "must be the name of an RTDE input, such as speed_slider_mask or input_int_register_*"
         raise StartError(f"reserve_inputs has {wrong[0]!r}: {why}")
-    return [name for names in found.values() for name in names]
+    return tuple(name for names in found.values() for name in names)
 
 
 OUTPUTS: dict[str, WireType] = {name: WireType[one.type] for name, one in VARIABLES.items()} | {
