@@ -250,8 +250,7 @@ def test_random_records_never_yield_an_invalid_payload(seed, ticks, size):
     random = np.random.default_rng(seed)
     q, moments = random.standard_normal((ticks, 6)), size * random.standard_normal((ticks, 6))
     record = MotionRecord(q, moments, min(ticks, 5), True, taken_for(paper_payload(ROBOT, 2.0)))
-    lesson = PayloadEstimator(ROBOT).study(record)
-    if lesson is not None:
+    if (lesson := PayloadEstimator(ROBOT).study(record)) is not None:
         assert 0.0 <= lesson.payload.mass <= 5.0
         assert abs(lesson.payload.mass - 2.0) > DEAD
         assert max(map(abs, lesson.payload.com)) <= 0.3

@@ -116,8 +116,7 @@ class Sessions(RuleBasedStateMachine):
     def send(self, kind, whose, **fields):
         """Send a command that needs control and renews the lease; return None if its token is refused."""
         token = self.token(whose)
-        code = refused(self.lease, token)
-        if code is None:
+        if (code := refused(self.lease, token)) is None:
             self.renew()
         reply = self.request(kind(token=token, **fields))
         if code is None:
@@ -255,13 +254,11 @@ class Sessions(RuleBasedStateMachine):
 
     def refused_step(self, token, motion_token, count):
         """Return code and field with which a step is refused; None if time passes."""
-        code = refused(self.lease if self.clock is None else self.clock, token)
-        if code is not None:
+        if (code := refused(self.lease if self.clock is None else self.clock, token)) is not None:
             clocked = self.clock is not None and refused(self.lease, token) is None
             return "no_control" if clocked else code, "token"
         if motion_token is not None:
-            code = refused(self.lease, motion_token)
-            if code is not None:
+            if (code := refused(self.lease, motion_token)) is not None:
                 return code, "motion_token"
         elif count and self.clock is not None:
             return "missing_field", "motion_token"
@@ -344,11 +341,9 @@ class Sessions(RuleBasedStateMachine):
             "speed_j": {"qd": (offset, 0.0, 0.0, 0.0, 0.0, 0.0)},
             "speed_l": {"xd": (0.0, 0.0, 0.0, 0.0, 0.0, offset)},
         }.get(command, {})
-        reply = self.send(MOTION[command], whose, **fields)
-        if reply is None:
+        if (reply := self.send(MOTION[command], whose, **fields)) is None:
             return
-        target = after(self.activity, command)
-        if target is not None:
+        if (target := after(self.activity, command)) is not None:
             assert isinstance(reply, Accepted if command in NUMBERED else Done), reply
             self.go(target)
             if command == "servo_start":
