@@ -30,10 +30,10 @@ STREAM = ("amplitude=0.4", "rate=2.0")  # up to 0.8 rad/s and 1.6 rad/s²; the l
 
 @pytest.mark.parametrize(
     ("times", "most"),
-    [(2, 60), pytest.param(20, 200, marks=[pytest.mark.nightly, pytest.mark.timeout(900)])],
+    [(1, 60), pytest.param(20, 200, marks=[pytest.mark.nightly, pytest.mark.timeout(900)])],
 )
 def test_arm_stops_within_260_ms_and_its_limits_after_a_client_dies(times, most, tmp_path, measured):
-    """Each client ends after a random number of set-points, `most` at most."""
+    """Each client ends after a random number of set-points, `most` at most; nightly some are suspended."""
     path, rng, ends = tmp_path / "run.mcap", random.Random(0), []
     with Served("--record", str(path)) as served:
         with Bystander(served.endpoint) as bystander:
@@ -66,7 +66,7 @@ def stream_and_end(endpoint, bystander, how, options, setpoints):
     assert bystander.command("simulation.reset", token=token, q=Q1, mode="RUNNING")["type"] == "done"
     assert bystander.command("release_control", token=token) == {"type": "done"}
     began = bystander.until_later(5)["tick"]
-    command = [sys.executable, CLIENT, endpoint, "stream", "lease_s=0.5", *options, *STREAM]
+    command = [sys.executable, CLIENT, endpoint, "stream", "lease_s=1", *options, *STREAM]
     client = forked.Popen(command, stdout=subprocess.PIPE)
     try:
         assert client.stdout.readline() == b"under way\n"

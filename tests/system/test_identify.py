@@ -1,7 +1,6 @@
 """`tvist identify`: jogs in process and over a network, logs, twins, payloads; and where it cannot be done."""
 
 import json
-from pathlib import Path
 
 import msgspec
 import pytest
@@ -14,7 +13,6 @@ from tvist_lab.identification.payload import PayloadFound
 from tvist_plant.description import fingerprint, load
 from tvist_protocol.calibration import calibration_from_json
 
-WAVE = Path(__file__).parents[2] / "clients" / "examples" / "wave.script"
 KEYS = {"configurations", "ring_downs", "error_f_d_percent", "error_zeta_percent"}
 FEWER = {
     "calibrate.CANDIDATES": 12, "calibrate.PLACES": 10, "calibrate.UNSEEN": 10, "calibrate.WORKSPACE": 10,
@@ -94,30 +92,33 @@ def test_identified_payload_is_declared_to_a_served_robot(lockstep, identified, 
         assert wire.info()["payload"] == msgspec.json.decode(msgspec.json.encode(payload))
 
 
-def test_identify_from_a_recording_writes_a_calibration_and_proposes_moves(identified, called, tmp_path):
-    """Five unshaped moves."""
-    wave, path, day = tmp_path / "wave.script", tmp_path / "mine.json", tmp_path / "day.mcap"
-    wave.write_text(WAVE.read_text(encoding="utf-8").replace("times < 3", "times < 2"), encoding="utf-8")
-    called("run", wave, "--lockstep", "--shaper", "none", "--payload", 2, "--record", day).assert_done()
+@pytest.fixture(scope="module")
+def day(tmp_path_factory):
+    """A recording of four unshaped moves of the one-joint arm."""
+    folder = tmp_path_factory.mktemp("day")
+    (folder / "swings.script").write_text(SWINGS, encoding="utf-8")
+    how = ("--robot", "one-joint", "--lockstep", "--shaper", "none", "--payload", 1, "--record", "day.mcap")
+    tvist("run", "swings.script", *how, cwd=folder).assert_done()
+    return folder / "day.mcap"
+
+
+def test_identify_from_a_recording_writes_a_calibration_and_proposes_moves(day, identified, tmp_path):
+    path = tmp_path / "mine.json"
     said = identified(day, "--output", path)
     assert said.keys() >= KEYS
-    assert said["stops"] == 5
-    assert said["used"] + sum(said["unused"].values()) == 5
-    assert said["payloads_kg"] == [2.0]
-    assert len(said["modes"]) == 3
+    assert said["stops"] == 4
+    assert said["used"] + sum(said["unused"].values()) == 4
+    assert said["payloads_kg"] == [1.0]
     assert len(said["proposals"]) == 3
     assert all(one["commands"][-1].startswith("tvist move ") for one in said["proposals"])
     calibration = calibration_from_json(path.read_bytes())
     assert calibration.modal is not None
     assert {one.status for one in calibration.modal.parameters} == {"identified", "not identifiable"}
-    assert calibration.provenance.arm == fingerprint(load("ur5e"))
+    assert calibration.provenance.arm == fingerprint(load("one-joint"))
 
 
-def test_twin_of_a_recording_can_be_served(identified, called, tmp_path):
-    path, day = tmp_path / "robot.toml", tmp_path / "day.mcap"
-    (tmp_path / "swings.script").write_text(SWINGS, encoding="utf-8")
-    how = ("--robot", "one-joint", "--lockstep", "--shaper", "none", "--payload", 1, "--record", day)
-    called("run", "swings.script", *how).assert_done()
+def test_twin_of_a_recording_can_be_served(day, identified, called, tmp_path):
+    path = tmp_path / "robot.toml"
     said = identified(day, "--twin")
     assert said["motions"] == 4
     assert said["residual_error_percent"] < 25.0
