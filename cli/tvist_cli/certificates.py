@@ -83,7 +83,9 @@ class CertificateAuthority(KeyPair):
         """Read an existing authority; raise CertificateError if the key does not belong to the certificate."""
         pair = cls(read_certificate(certificate), _read_key(key))
         if pair.certificate.public_key() != pair.key.public_key():
-            raise CertificateError(f"{key} is not the key of {certificate}: put that one there")
+            raise CertificateError(
+                f"{key} is not the key of {certificate}: put the key of that certificate there"
+            )
         return pair
 
     def issue(

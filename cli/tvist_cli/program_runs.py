@@ -205,20 +205,18 @@ class Runner:
         result = {
             "file": named(file), "lockstep": lockstep, "recording": self.config.record, **as_dict(watch)
         }  # fmt: skip
-        differing = [] if self.baseline is None else changes(self.baseline[named(file)], result)
-        found = {
-            ("broke", "limit"): [*broken(self.limits, watch)],
-            ("missed", "expectation"): missed(self.limits, watch.plant),
-            ("differs from the baseline in", "point"): [*differing],
-        }
-        judged = [one for some in found.values() for one in some]
+        differing = [] if self.baseline is None else [*changes(self.baseline[named(file)], result)]
+        exceeded, misplaced = [*broken(self.limits, watch)], missed(self.limits, watch.plant)
+        judged = [*exceeded, *misplaced, *differing]
         failures = [*_ended(watch, errors), *judged]
         result |= {"ok": not failures, "failures": [asdict(one) for one in failures]}
         failure = _failure(file, watch, errors)
         for one in judged:
             say(f"{named(file)}:{'' if one.line is None else f'{one.line}:'} {one.text}")
         if failure is None and failures:
-            parts = (f"{does} {counted(len(some), what)}" for (does, what), some in found.items() if some)
+            parts = [f"broke {counted(len(exceeded), 'limit')}"] if exceeded else []
+            parts += [f"missed {counted(len(misplaced), 'expectation')}"] if misplaced else []
+            parts += [f"differs from the baseline in {counted(len(differing), 'point')}"] if differing else []
             failure = Failure(f"{named(file)} {' and '.join(parts)}")
         return ProgramOutcome(result, summary(watch), failure, server)
 

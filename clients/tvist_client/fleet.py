@@ -29,8 +29,8 @@ SETTLE_S = 0.3
 """Time for tokens to arrive after the session has opened [s]; on a slow network, `look` also sees late ones."""
 LISTEN_S = 1.3  # time in which every robot in real time publishes its telemetry at least once [s]
 _TIMING = ("ticks_per_second", "missed_ticks", "late_p99_us", "load", "due_ticks", "overloaded")
-_OF_INFO = ("model", "clock", "control")
-"""Fields of a fleet's robot that are those of its telemetry, and of its description."""
+"""Fields of a fleet's robot that its telemetry has."""
+_OF_INFO = ("model", "clock", "control")  # those that its description has
 
 
 class RobotPlace(NamedTuple):

@@ -52,10 +52,11 @@ def joint_angles(q: Iterable[float], info: Info, where: str = "q") -> tuple[floa
         why = f"{where} has {len(angles)} angles; this arm has {joints} joints: give one per joint"
         raise ArgumentError(where, why, joints)
     for place, (angle, (low, high)) in enumerate(zip(angles, info.limits.position, strict=True)):
+        if low <= angle <= high and math.isfinite(angle):
+            continue
         field = f"{where}[{place}]"
         if not math.isfinite(angle):
             raise ArgumentError(field, f"{field} is {angle}: must be a finite number of rad")
-        if not low <= angle <= high:
-            why = f"{field} is {angle:g} rad: joint {info.joints[place]} allows {low:g} to {high:g} rad"
-            raise ArgumentError(field, why, low if angle < low else high)
+        why = f"{field} is {angle:g} rad: joint {info.joints[place]} allows {low:g} to {high:g} rad"
+        raise ArgumentError(field, why, low if angle < low else high)
     return angles

@@ -130,7 +130,7 @@ def serve(wanted: WantedRobot, connection: socket.socket) -> int:
 
 def _listening(wanted: WantedRobot, preparation: Preparation) -> tuple[Server, dict[str, Any]]:
     """Return a server that listens on unused ports, and the addresses."""
-    for _ in range(ATTEMPTS):
+    for _ in range(ATTEMPTS - 1):
         with contextlib.suppress(GatewayError):
             return _on_free_ports(wanted, preparation)
     return _on_free_ports(wanted, preparation)

@@ -116,7 +116,10 @@ def pytest_runtest_makereport(
         if call.excinfo is None:
             _release_locals()
         for robot in robots:
-            (robot.keep if told or keep_all else robot.discard)()
+            if told or keep_all:
+                robot.keep()
+            else:
+                robot.discard()
         del item.stash[ROBOTS]
         item.stash[_TOLD] = False  # a test may run again
     return report

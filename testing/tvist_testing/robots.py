@@ -127,7 +127,10 @@ class Robots:
     def close(self) -> None:
         """End the process and robots that still run."""
         for served in self._served:
-            (served.forget if served.closed else served.kill)()
+            if served.closed:
+                served.forget()
+            else:
+                served.kill()
         self._served.clear()
         if self._running is not None:
             process, requests = self._running

@@ -67,7 +67,8 @@ class RobotOfTest:
         ]
         with suppress(OSError):
             told = self.files[1].read_text(encoding="utf-8", errors="replace").splitlines()
-            lines += ["its log ends with:", *told[-LOG_LINES:]]
+            if told:
+                lines += ["its log ends with:", *told[-LOG_LINES:]]
         return "\n".join(lines)
 
 

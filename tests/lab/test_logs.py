@@ -295,6 +295,7 @@ def test_any_names_units_and_separators_are_read(tmp_path):
     given = "time=t:ms,q=joint_{}:deg,target_q=plan_{}:deg,accelerometer=acc_{}:g"
     for columns in (given, "time=t,q=joint_{}:deg,target_q=plan_{}:deg,accelerometer=acc_{}"):
         recording = read(path, columns)
+        assert {"timestamp", "actual_q", "target_q", "actual_tool_accelerometer"} <= recording.columns.keys()
         for name in recording.columns:
             assert recording[name] == pytest.approx(expected[name], abs=1e-9), name
         said = [note for note in recording.notes if "taken as" in note]

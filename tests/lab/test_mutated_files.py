@@ -364,7 +364,7 @@ HOSTILE = {
 }  # fmt: skip
 """Files made to hang a reader or to take its memory, each with its kind."""
 
-FEWER = {"parquet": 10, "commands": 3}  # how many times fewer files are tried of kinds that take long
+FEWER = {"parquet": 4, "commands": 2}  # how many times fewer files are tried of kinds that take long
 
 
 def _limit_time() -> None:
@@ -387,7 +387,6 @@ def main(folder: Path, count: int, kinds: list[str]) -> None:
 
 
 def _read_bad(kind, count, good, read, refusal, write):
-    good = good[:count]
     for path in good:
         read(path)
     taken = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
@@ -395,7 +394,7 @@ def _read_bad(kind, count, good, read, refusal, write):
     was_read = 0
     for number in range(count):
         random = np.random.default_rng((0, number))
-        path = good[number % len(good)]
+        path = good[number * len(good) // count] if count < len(good) else good[number % len(good)]
         bad = path.with_name(f"bad-{path.name}")
         if write is None:
             bad.write_bytes(mutated(path.read_bytes(), random, 1 if kind == "commands" else 3))

@@ -81,10 +81,10 @@ def test_unmeasured_values_do_not_affect_the_verdict():
 
 @pytest.fixture(scope="module")
 def files(tmp_path_factory):
-    """A name of markup, of a log without accelerometer, and one like a formula, which is drawn."""
+    """Names of markup: of a log without accelerometer, and, also like a formula, of one that is drawn."""
     folder = tmp_path_factory.mktemp("report")
     mute = SyntheticLog(motions=1).without("actual_tool_accelerometer")
-    drawn = SyntheticLog(motions=1).csv(folder / r"100% $\frac{$.csv")
+    drawn = SyntheticLog(motions=1).csv(folder / r"<script>&100% $\frac{$.csv")
     return [mute.csv(folder / "<script>alert(1)<&.csv"), drawn]
 
 

@@ -170,10 +170,11 @@ def rung(random, modes, rate, correlation, seconds=1.5):
     return alpha + 0.03 * coloured(random, correlation, alpha.shape), time
 
 
+@pytest.mark.parametrize("count", [3, pytest.param(12, marks=pytest.mark.nightly)])
 @pytest.mark.parametrize("correlation", [0.0, 0.9])
-def test_intervals_contain_two_close_modes(correlation, measured):
+def test_intervals_contain_two_close_modes(count, correlation, measured):
     inside, found = [], 0
-    for seed in range(3):
+    for seed in range(count):
         random = np.random.default_rng([seed, 7])
         f_d = random.uniform(6.0, 18.0)
         first = (f_d, random.uniform(0.01, 0.06), 1.0)
@@ -194,10 +195,11 @@ def test_intervals_contain_two_close_modes(correlation, measured):
     assert np.mean(inside) > 0.85
 
 
-def test_intervals_contain_a_mode_that_changes_with_amplitude(measured):
+@pytest.mark.parametrize("count", [4, pytest.param(12, marks=pytest.mark.nightly)])
+def test_intervals_contain_a_mode_that_changes_with_amplitude(count, measured):
     """f_d rises by 3 % and ζ falls to a half with the amplitude; the truth is the mean over the energy."""
     inside = []
-    for seed in range(4):
+    for seed in range(count):
         random = np.random.default_rng([seed, 11])
         f_d, zeta, step = random.uniform(7.0, 18.0), random.uniform(0.03, 0.06), 5e-4
         amplitude, phase, courses = 1.0, 0.0, []

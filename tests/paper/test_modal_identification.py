@@ -107,6 +107,7 @@ def test_calibration_has_errors_and_origin(done):
     assert calibration.robot == ROBOT.robot.model
     assert calibration.provenance.ring_downs == len(model.ring_downs) == 5
     assert [payload.mass for payload in model.payloads] == [0.0, 5.0]
+    assert [ring.payload for ring in model.ring_downs].count(0) == 3
     assert 0.8 < model.residual_to_noise < 1.3
     status = {(p.quantity, p.joints): p for p in model.parameters}
     shoulder = status["gear_stiffness", (1,)]

@@ -33,7 +33,7 @@ STREAM = ("amplitude=0.4", "rate=2.0")  # up to 0.8 rad/s and 1.6 rad/s²; the l
     [(1, 60), pytest.param(20, 200, marks=[pytest.mark.nightly, pytest.mark.timeout(900)])],
 )
 def test_arm_stops_within_260_ms_and_its_limits_after_a_client_dies(times, most, tmp_path, measured):
-    """Each client ends after a random number of set-points, `most` at most; nightly some are suspended."""
+    """Each client ends after a random number of set-points; nightly some are suspended or have a token."""
     path, rng, ends = tmp_path / "run.mcap", random.Random(0), []
     with Served("--record", str(path)) as served:
         with Bystander(served.endpoint) as bystander:

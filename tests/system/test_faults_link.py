@@ -115,7 +115,7 @@ def test_slow_link_drops_states_but_delivers_answers(proxy, bystander, measured)
             wire.until(bystander.until_later()["tick"])
             under_way = sum(state["tick"] <= newest for state in wire.received["state"][came:])
             measured("states under way", under_way)
-            assert under_way < 1000
+            assert under_way < 250  # without dropping: at least 400
         dropped = missing(wire)
         measured("states dropped for this client", dropped)
         assert dropped > 0

@@ -1,6 +1,5 @@
 """Faults of the server: it is suspended, killed or blocked, or its arm fails."""
 
-import json
 import signal
 
 import pytest
@@ -141,6 +140,4 @@ def test_failing_arm_is_stopped_and_recorded_and_another_robot_is_not_disturbed(
         served.wait_until_said("look with tvist log analyze")
     (dump,) = tmp_path.glob("*.mcap")
     assert f"tvist-ur5e-1-{served.process.pid}-{event['tick']}" in dump.name
-    code, out, err = called("log", "analyze", str(dump), "--json")
-    assert (code, err) == (0, "")
-    assert json.loads(out)["events"]
+    assert called("log", "analyze", dump, "--json").assert_done().json["events"]

@@ -48,8 +48,13 @@ def test_arm_stops_within_its_limits_after_each_fault_of_the_client(faults, tmp_
             abs(q) <= 1.0001 * most for q, most in zip(state.target_qdd, LIMITS.acceleration, strict=True)
         )
     ends = [event.tick for event in content.events if event.kind == "program_stopped"]
-    rests = [state.tick for state in content.states if max(map(abs, state.target_qd)) == 0.0]
-    assert all(any(end <= tick <= end + 150 for tick in rests) for end in ends)
+    begins = [event.tick for event in content.events if event.kind == "program_started"]
+    speeds = {state.tick: max(map(abs, state.target_qd)) for state in content.states}
+    last = content.states[-1].tick
+    for end, following in zip(ends, [*begins[1:], last], strict=True):
+        rest = next(tick for tick in range(end, last) if speeds[tick] == 0.0)
+        assert rest <= end + 150
+        assert not any(speeds[tick] for tick in range(rest, following))
 
 
 def assert_told(fault, events):

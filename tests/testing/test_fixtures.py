@@ -15,7 +15,7 @@ from tvist_client.errors import ClientError
 from tvist_lab.recordings import mcap_file
 from tvist_plant.plant import Measurement
 from tvist_protocol.modes import RobotMode, SafetyMode
-from tvist_testing import assert_residual_vibration_below, assert_settles_within
+from tvist_testing import assert_settles_within
 from tvist_testing import robots as making
 from tvist_testing.markers import ROBOTS
 
@@ -170,7 +170,7 @@ def test_ur_interfaces_answer_on_their_own_address_and_move_the_arm(tvist_ur):
         scripts.sendall(f"movej({target}, a=3, v=1)\n".encode())
         while tvist_ur.state().reference_q != pytest.approx(target, abs=1e-6):
             pass
-    assert_residual_vibration_below(tvist_ur, 2.0, window=0.05)
+    assert_settles_within(tvist_ur, 0.5)
     assert (tvist_ur.info().clock, tvist_ur.info().payload.mass) == ("realtime", 3.0)
 
 

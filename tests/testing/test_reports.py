@@ -4,12 +4,15 @@ import os
 import select
 import xml.etree.ElementTree as ET
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from tvist_kernels.cache import own_folder
 from tvist_lab.recordings import mcap_file, read
 from tvist_lab.replay import replay_file
+from tvist_testing.markers import ROBOTS
+from tvist_testing.plugin import pytest_runtest_makereport
 
 pytest_plugins = ["pytester"]
 
@@ -95,6 +98,30 @@ def light(pytester, monkeypatch):
     (hidden / "sitecustomize.py").write_text(HIDDEN)
     monkeypatch.setenv("PYTHONPATH", str(hidden))
     return pytester
+
+
+@pytest.mark.parametrize(
+    ("failed", "keep_all", "end"), [(True, False, "keep"), (False, False, "discard"), (False, True, "keep")]
+)
+def test_robots_of_failed_tests_are_kept(failed, keep_all, end):
+    """The hook is run as pytest runs it, for a test and its end; the robot records what it is asked."""
+    asked = []
+    robot = SimpleNamespace(
+        keep=lambda: asked.append("keep"), discard=lambda: asked.append("discard"),
+        recording=Path("ur5e.mcap"), described=lambda: "its recording", properties=list,
+    )  # fmt: skip
+    stash = pytest.Stash()
+    stash[ROBOTS] = [robot]
+    config = SimpleNamespace(getoption=lambda _: keep_all)
+    item = SimpleNamespace(stash=stash, config=config, user_properties=[])
+    for when, fails in (("call", failed), ("teardown", False)):
+        assert not asked
+        report = SimpleNamespace(when=when, failed=fails, longrepr=None, sections=[], user_properties=[])
+        hook = pytest_runtest_makereport(item, SimpleNamespace(excinfo=None))
+        next(hook)
+        with pytest.raises(StopIteration):
+            hook.send(report)
+    assert asked == [end]
 
 
 @pytest.mark.nightly

@@ -12,13 +12,16 @@ PINNED = re.compile(r"^([\w.-]+==[^ ]+(?: ;[^\\\n]*)?)", re.MULTILINE)
 
 
 class FailedError(Exception):
-    """An environment does not contain what was built."""
+    """A program failed, or an environment does not contain what was built."""
 
 
 def run(*words: str | Path, cwd: Path, env: dict[str, str] | None = None, seconds: float = 1800) -> str:
     """Run a program, which must succeed in time, and return its stdout."""
     out = subprocess.PIPE
-    return subprocess.run(words, cwd=cwd, env=env, timeout=seconds, stdout=out, text=True, check=True).stdout
+    ran = subprocess.run(words, cwd=cwd, env=env, timeout=seconds, stdout=out, text=True, check=False)
+    if ran.returncode != 0:
+        raise FailedError(f"{words} ended with exit code {ran.returncode}: {ran.stdout}")
+    return ran.stdout
 
 
 def constraints(lock: str) -> str:

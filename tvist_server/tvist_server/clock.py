@@ -127,7 +127,8 @@ class Lockstep(Clock):
 
     def _run(self) -> None:
         # The deadline is absolute, because other jobs, such as telemetry, may also arrive every second.
-        (robot,), due = self._robots, time.monotonic() + REPEAT_EVERY
+        (robot,) = self._robots
+        due = time.monotonic() + REPEAT_EVERY
         while self._running:
             robot.guarded(partial(robot.jobs.do_next, max(0.0, due - time.monotonic())))
             if self._running and time.monotonic() >= due:

@@ -42,7 +42,7 @@ class Pilot:
         self._jog = (0, 0.0)
         self._jog_until = self._jog_heard = 0.0
         self._jog_barred = False  # until the button is released
-        self._jogging: asyncio.Task[bool] | None = None
+        self._jogging: asyncio.Task[None] | None = None
         self._changing = asyncio.Lock()
 
     async def take(self, tab: int) -> bool:
@@ -133,7 +133,7 @@ class Pilot:
             return
         self._jog_until = now + DEADMAN_S
         if self._jogging is None or self._jogging.done():
-            self._jogging = asyncio.create_task(self._told(self._play_jog(self._arm)))
+            self._jogging = asyncio.create_task(self._follow_jog(self._arm))
 
     async def make_ready(self, arm: Arm) -> None:
         """Release what a client can release, and switch the power on; show what remains to be done."""
@@ -149,10 +149,13 @@ class Pilot:
         try:
             await doing
         except (RefusedError, ClientError, ProtocolError) as error:
-            self._jog_barred = True
             self._say(str(error))
             return False
         return True
+
+    async def _follow_jog(self, arm: Arm) -> None:
+        if not await self._told(self._play_jog(arm)):
+            self._jog_barred = True
 
     async def _play_jog(self, arm: Arm) -> None:
         loop, info = asyncio.get_running_loop(), await self._robot.info()

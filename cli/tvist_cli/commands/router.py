@@ -38,7 +38,7 @@ def router(
     if robots and not rates:
         raise Misuse("robot needs --rate HZ, the rate of these robots: give it, or leave --robot out")
     endpoints, ending = listen or [DEFAULT_ENDPOINT], Shutdown()
-    with ending.at_once():
+    with ending.at_once(), failing_on(ValueError, exit_code=2):
         session = start_router(endpoints, connect or [], rates, robots, security=security, insecure=insecure)
 
     async def run() -> None:

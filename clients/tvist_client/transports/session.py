@@ -33,12 +33,12 @@ CONFIG: Mapping[str, Any] = {
 
 def open_session(endpoint: str, security: Folder | None = None, namespace: str = "") -> zenoh.Session:
     """Open a session, whose keys omit the namespace. Blocks while it connects."""
-    invalid = NotConnectedError(
+    invalid = (
         f"{quoted(endpoint)} is not an endpoint: it must have the form tcp/<host>:<port>, such as "
         "tcp/127.0.0.1:7447, with a port from 1 to 65535"
     )
     if not isinstance(endpoint, str) or not _ENDPOINT.fullmatch(endpoint):
-        raise invalid
+        raise NotConnectedError(invalid)
     config, shown = zenoh.Config(), settings(endpoint, security)
     if namespace:
         shown["namespace"] = check_namespace(namespace)
@@ -46,7 +46,7 @@ def open_session(endpoint: str, security: Folder | None = None, namespace: str =
         for path, value in {**CONFIG, **shown, "connect/endpoints": [endpoint]}.items():
             config.insert_json5(path, json.dumps(value))
     except zenoh.ZError as error:
-        raise invalid from error
+        raise NotConnectedError(invalid) from error
     try:
         session = zenoh.open(config)
     except zenoh.ZError as error:

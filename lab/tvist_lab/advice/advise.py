@@ -82,10 +82,10 @@ def advise(logs: Sequence[MeasuredRecording]) -> Advice:
         return Advice((), quiet, shaped, refused, (), (), None, weak=weak)
     found = sorted(options(loud), key=lambda one: (one.still_s, one.left_percent))
     best = recommended(found, median(one.unshaped.still for one in loud))
-    smooth, slow = (
-        None if best is None else _median(way(one, best.added[one]) for one in loud)
-        for way in (smoothed, slowed)
-    )
+    smooth = slow = None
+    if best is not None:
+        smooth = _median(smoothed(one, best.added[one]) for one in loud)
+        slow = _median(slowed(one, best.added[one]) for one in loud)
     return Advice(loud, quiet, shaped, refused, ringing_modes(loud), found, best, smooth, slow)
 
 

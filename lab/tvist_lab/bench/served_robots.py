@@ -8,7 +8,6 @@ import tempfile
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
-from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -66,17 +65,18 @@ async def one_robot(
 
 async def punctuality(server: RunningServer, seconds: float) -> tuple[dict[str, float], float]:
     """Return the lateness of the ticks, and the share of a core that the server uses."""
-    robot, states = server.robot, count()
+    robot = server.robot
+    states: list[State] = []
     heard: list[Telemetry] = []
     missed_before = (await robot.state()).missed_ticks
-    forget = robot.on_state(lambda _: next(states)), robot.on_telemetry(heard.append)
+    forget = robot.on_state(states.append), robot.on_telemetry(heard.append)
     used, began = cpu_seconds(server.pid), time.monotonic()
     await robot.advance(round(seconds / PERIOD))
     share = (cpu_seconds(server.pid) - used) / (time.monotonic() - began)
     missed = (await robot.state()).missed_ticks - missed_before
     for function in forget:
         function()
-    told = {"seconds": seconds, "missed": missed, "states_received": next(states)}
+    told = {"seconds": seconds, "missed": missed, "states_received": len(states)}
     return told | {"missed_percent": 100.0 * missed_share(heard)} | over_all(heard), share
 
 

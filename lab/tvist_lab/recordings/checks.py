@@ -110,7 +110,7 @@ def check_recording(path: Path, recording: Recording, places: Places | None = No
     if (back := np.flatnonzero(step <= 0.0)).size:
         before, after = time[back[0] : back[0] + 2]
         raise LogError(
-            f"{path}, tick {tick[back[0] + 1]:.0f}: {TIME} is {after:.6g} s after {before:.6g} s: must increase"
+            f"{path}, tick {tick[back[0] + 1]:.0f}: {TIME} goes from {before:.6f} to {after:.6f} s: must increase"
         )
     # The clock of another controller may not be in step with its ticks.
     for period in (np.median(periods), recording.period, *([] if recording.foreign else [np.max(periods)])):

@@ -105,10 +105,9 @@ def _reason(error: Exception) -> str:
     return getattr(error, "strerror", None) or (found[1] if found else str(error))
 
 
-FORMATS: dict[str, Callable[[Recording, IO[bytes]], None]] = {
-    "csv": lambda recording, to: (
-        flat(recording).with_columns(pl.col(pl.Float64).fill_nan(None)).write_csv(to)
-    ),
-    "parquet": _write_parquet,
-}
+def _write_csv(recording: Recording, to: IO[bytes]) -> None:
+    flat(recording).with_columns(pl.col(pl.Float64).fill_nan(None)).write_csv(to)
+
+
+FORMATS: dict[str, Callable[[Recording, IO[bytes]], None]] = {"csv": _write_csv, "parquet": _write_parquet}
 """Function that writes each format; a file's ending is the format's name."""

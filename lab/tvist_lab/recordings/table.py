@@ -231,8 +231,8 @@ def _increasing(table: LogTable, time: Floats) -> tuple[NDArray[np.intp], list[s
     if (back := np.flatnonzero(step < 0.0)).size:
         row = timed[back[0] + 1]
         raise LogError(
-            f"{table.path}, {table.unit} {int(table.lines[row])}: {TIME} goes back from {time[timed[back[0]]]:.6g} to "
-            f"{time[row]:.6g} s; split the file there, since it contains two logs"
+            f"{table.path}, {table.unit} {int(table.lines[row])}: {TIME} goes back from {time[timed[back[0]]]:.6f} to "
+            f"{time[row]:.6f} s; split the file there, since it contains two logs"
         )
     if (again := np.flatnonzero(step == 0.0)).size:
         first = int(table.lines[timed[again[0] + 1]])

@@ -102,6 +102,7 @@ class Modal(Estimator):
         self._rows = drivetrain.rows
         self._poles: Complex = np.zeros(modes, dtype=complex)
         self._shapes: Complex = np.zeros((modes, size), dtype=complex)
+        self._before = self._poles.copy(), self._shapes.copy()
         self._scratch: Complex = np.zeros((size, size + 1), dtype=complex)
         self._q: Floats = np.zeros(0)
         self._lowest, self._lost = False, False
@@ -135,6 +136,8 @@ class Modal(Estimator):
     def _lie(self, q: Floats) -> int:
         """Compare a configuration with the last one, and take its place; the first is a jump."""
         if q.shape != self._q.shape:
+            if q.ndim != 1:
+                raise EstimatorError("q", q.shape, "of shape (joints,)")
             size, shape = len(self._rows[0]), np.shape(self._mass_matrix(q))
             if shape != (size, size):
                 raise EstimatorError(
@@ -152,10 +155,10 @@ class Modal(Estimator):
             self._take_lowest(q, mass)
             return
         self._lowest = False
-        before = self._poles.copy(), self._shapes.copy()
+        self._before[0][:], self._before[1][:] = self._poles, self._shapes
         self._lost = not follow(mass, self._rows, self._poles, self._shapes, self._scratch)
         if self._lost:
-            self._poles, self._shapes = before
+            self._poles[:], self._shapes[:] = self._before
             self._check(q, mass)
 
     def _take_lowest(self, q: Floats, mass: Floats) -> None:

@@ -65,8 +65,8 @@ def drive(
 class MujocoArm(SimulatedArm):
     """The arm in MuJoCo: deterministic, in a scene with sensor noise, a force sensor and possibly a gripper.
 
-    `PERIOD` must be a multiple of `timestep` [s]; 1 ms is unstable for the UR5e. Raise SceneError if
-    the scene is invalid or no arm can stand in it.
+    Raise ValueError unless `PERIOD` is a multiple of `timestep` [s] (1 ms is unstable for the UR5e), and
+    SceneError if the scene is invalid or no arm can stand in it.
     """
 
     def __init__(
@@ -78,6 +78,8 @@ class MujocoArm(SimulatedArm):
         timestep: float = TIMESTEP,
     ) -> None:
         self._steps = round(PERIOD / timestep)
+        if self._steps < 1 or abs(self._steps * timestep - PERIOD) > 1e-12:
+            raise ValueError(f"timestep is {timestep} s: must divide {PERIOD} s")
         self._description, self._scene, self._timestep = description, scene, timestep
         drives, joints = description.drives, description.joints
         K_d, K_p, K_i = map(np.array, (drives.velocity_gain, drives.position_gain, drives.integral_gain))

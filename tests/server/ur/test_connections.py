@@ -105,7 +105,7 @@ async def test_served_clients_are_never_displaced(later, served, caplog):
         assert len(await other.readexactly(1220)) == 1220
 
 
-class Served:
+class LastingClient:
     """A client that may not be displaced."""
 
     dispensable = False
@@ -115,10 +115,10 @@ def test_some_connections_are_reserved_for_this_machine():
     said = []
     limit = ConnectionLimit(lambda: 100.0, said.append)
     while len(limit.taken) < MAX_CONNECTIONS - LOCAL_PLACES:
-        limit.taken.add(Served())
+        limit.taken.add(LastingClient())
     assert not limit.make_room("far", local=False)
     assert "8 are kept for this machine" in said[0]
     for _ in range(LOCAL_PLACES):
         assert limit.make_room("near", local=True)
-        limit.taken.add(Served())
+        limit.taken.add(LastingClient())
     assert not limit.make_room("near", local=True)

@@ -124,7 +124,7 @@ class ZenohGateway(Gateway):
         if payload is None:
             answer(_malformed("", "the query has no payload: a command is the payload of a query"))
         elif len(payload) > MAX_BYTES:
-            why = f"the message has {len(payload)} bytes, at most {MAX_BYTES} are allowed"
+            why = f"the message has {len(payload)} bytes: must have at most {MAX_BYTES}"
             answer(_malformed("", why, MAX_BYTES))
         else:
             self._queried.request(payload.to_bytes(), answer)

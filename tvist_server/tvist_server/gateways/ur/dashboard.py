@@ -220,7 +220,7 @@ class DashboardSession(InTurnSession[str]):
     """One client of the dashboard. Answers keep their order, but a `stop` takes effect when it is read."""
 
     client_begins = True
-    most_waiting = 256  # lines, so that a `stop` behind fewer is read; they take up to 1 MB
+    most_waiting = 256  # lines, so that a `stop` behind fewer is read; at most 1 MB a client
     _lines: LineSplitter = field(default_factory=partial(LineSplitter, LONGEST), init=False)
     _rests: Deferred[bool] | None = field(default=None, init=False)  # waits for the arm to rest
     _last: int = field(default=0, init=False)  # tick at which this wait ends
