@@ -34,14 +34,13 @@ END_METADATA = "tvist.end"
 """Name of the metadata written last: for each channel, how many messages were dropped."""
 BEHAVIOUR = "behaviour"
 """Entry of that metadata: the number of the robot's behaviour, see `THIS_BEHAVIOUR`; 1 where it is missing."""
-THIS_BEHAVIOUR = 8
+THIS_BEHAVIOUR = 7
 """Number of the present behaviour. It rises with every deliberate change of the bits that a robot computes:
 
 1: recordings without this number.
 2: the arm, the line and the shapers are computed by compiled functions, which add in another order.
 5: `auto-target` uses zero-vibration shapers at a known end.
-7: all kinematics of the rigid arm come from one chain of links.
-8: where two joints are free, inverse kinematics finds nearer postures.
+7: all kinematics of the rigid arm come from one chain of links; singular arms find nearer postures.
 """
 FROM_TICK = "from_tick"
 """Entry of that metadata in a segment after the first one of a recording: its first tick."""
