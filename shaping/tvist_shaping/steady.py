@@ -185,7 +185,7 @@ class SteadyFilter(Filter):
         design: Computes the taps.
     """
 
-    spared = EXCESS
+    initial_excess = EXCESS
     """Initial value of `excess` [-]."""
 
     def __init__(
@@ -215,7 +215,7 @@ class SteadyFilter(Filter):
             )  # fmt: skip
         super().__init__(design.name, estimator, joints, design.period, design.taps + 4, design.peak)
         self.design, self.feed_forward = design, feed_forward
-        self.excess = 0.0 if design.constant else self.spared
+        self.excess = 0.0 if design.constant else self.initial_excess
         self._reach = design.taps
         self._smooth = 1 if design.constant else SMOOTH
         self._delays = np.arange(design.taps, dtype=float)
@@ -278,7 +278,7 @@ class AimedFilter(SteadyFilter):
     they fit less well during the motion. If no end is known, as in a stream, the filter behaves like a `SteadyFilter`.
     """
 
-    spared = 0.0
+    initial_excess = 0.0
     _aimed = False
 
     def aim(self, q: npt.ArrayLike | None) -> None:

@@ -96,9 +96,9 @@ class Line(ControlCycle):
 
     def stream(self, stream_period: float, limits: MotionLimits) -> SetpointStream:
         """Follow set-points from rest; no guard watches."""
-        spared, reach = self.filter.spared(limits), np.array(self.description.limits.position)
+        limits, reach = self.filter.reduced_limits(limits), np.array(self.description.limits.position)
         torque = StreamTorqueMargin(self.description, self.dynamics)
-        return self.begin(SetpointStream(self.reference, stream_period, spared, reach=reach, torque=torque))
+        return self.begin(SetpointStream(self.reference, stream_period, limits, reach=reach, torque=torque))
 
 
 def cycle(name: str = "zv", q=Q1, estimator=None, seed: int = 0, plant: Plant | None = None) -> Line:

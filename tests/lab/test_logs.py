@@ -188,7 +188,10 @@ def test_damaged_lines_are_omitted_or_sorted_with_a_note(tmp_path, kind):
 
 
 REFUSED = {
-    "goes back": (lambda lines: lines + lines[1:300], r"line 1502.*goes back from 102.998000 to 100.000000 s"),
+    "goes back": (
+        lambda lines: lines + lines[1:300],
+        r"line 1502.*goes back from 102.998000 to 100.000000 s",
+    ),
     "a word": (lambda lines: with_cell(lines, "north"), r"line 301, column target_q_3: 'north'"),
     "no time": (lambda lines: [line.split(",", 1)[1] for line in lines], "no column timestamp"),
     "a name twice": (lambda lines: [",".join(line.split(",")[:1] * 2) for line in lines], "twice"),

@@ -33,12 +33,12 @@ class StreamGuard(Guard):
         self,
         collisions: CollisionModel,
         stops: StopPlanner,
-        room: StreamTorqueMargin,
+        torque: StreamTorqueMargin,
         *,
         reach: Floats | None = None,  # shape (n,) [rad]
     ) -> None:
         self._reach = reach
-        self._collisions, self._stops, self._torque = collisions, stops, room
+        self._collisions, self._stops, self._torque = collisions, stops, torque
         self._before: tuple[Target, float | JointStop] | None = None
         self.met: CloseBodies | None = None
         """Bodies that come close during the latest stop that is not clear; None if it leaves the joints' range."""
@@ -134,10 +134,10 @@ class RemainingMotion:
     def __init__(self, cycle: ControlCycle, stopper: Stopper, collisions: CollisionModel) -> None:
         self._cycle, self._collisions = cycle, collisions
         self._stopper = stopper
-        room = StreamTorqueMargin(cycle.description, cycle.dynamics)
-        self._guard = StreamGuard(collisions, stopper.stops, room)
+        torque = StreamTorqueMargin(cycle.description, cycle.dynamics)
+        self._guard = StreamGuard(collisions, stopper.stops, torque)
         reach = np.array(cycle.description.limits.position)
-        self._guide_guard = StreamGuard(collisions, stopper.stops, room, reach=reach)
+        self._guide_guard = StreamGuard(collisions, stopper.stops, torque, reach=reach)
 
     def guard_of_stream(self) -> StreamGuard:
         """Return the guard of a stream that starts from rest."""

@@ -162,7 +162,7 @@ class ControlCycle:
             self.filter.begin(tvist, self.sample.reference)
         else:
             self.filter.use(tvist)
-            self.trajectory.adapt(self.filter.spared)
+            self.trajectory.adapt(self.filter.reduced_limits)
 
     def go_on(self, longer: PlannedMotion) -> None:
         """Extend the present planned motion to the end of a longer one that is equal until now."""

@@ -45,7 +45,7 @@ class LineFilter:
         fade = self._fade
         return self.tvist.peak if fade is None else max(self.tvist.peak, fade.old.peak, fade.new.peak)
 
-    def spared(self, limits: MotionLimits | None = None) -> MotionLimits:
+    def reduced_limits(self, limits: MotionLimits | None = None) -> MotionLimits:
         """Return limits of a reference such that the shaped one keeps the arm's limits and the given ones."""
         arm, (faster, harder) = self._arm, (1.0 + more for more in self.tvist.surplus)
         limits = arm if limits is None else limits

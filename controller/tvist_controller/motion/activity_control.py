@@ -182,7 +182,7 @@ class MotionControl:
         stream = SetpointStream(
             cycle.sample.reference,
             period,
-            cycle.filter.spared(limits),
+            cycle.filter.reduced_limits(limits),
             reach=np.array(cycle.description.limits.position),
             torque=StreamTorqueMargin(cycle.description, cycle.dynamics),
         )

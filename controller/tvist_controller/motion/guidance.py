@@ -111,7 +111,7 @@ class Guidance:
         self._halt("stop_l", stop, stop.duration)
 
     def _most(self, shaped: bool) -> MotionLimits:
-        return self._cycle.filter.spared(self.limits) if shaped else self.limits
+        return self._cycle.filter.reduced_limits(self.limits) if shaped else self.limits
 
     def check(self, trigger: str, *, shaped: bool = False) -> None:
         """Raise RefusalError if the present activity does not allow a command."""

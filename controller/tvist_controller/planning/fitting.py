@@ -214,8 +214,8 @@ def keeping_motion(
     )
     share = 1.0 - tvist.excess
     for _ in range(KEEPING_TRIES):
-        spared = replace(limits, acceleration=limits.acceleration * share)
-        motion = quickest_motion(path, spared, speed, agility)
+        reduced = replace(limits, acceleration=limits.acceleration * share)
+        motion = quickest_motion(path, reduced, speed, agility)
         if easy:
             break
         if (ahead := shaped_ahead(motion, tvist)) is None:

@@ -72,8 +72,8 @@ class MovePlanner(Fitter):
             )
             if now.excess > 0.0 and not at_once:
                 return keeping_motion(path, kept, self._filters.like(now.filter), rate, agility)
-            spared = replace(kept, acceleration=kept.acceleration * (1.0 - now.excess))
-            return quickest_motion(path, spared, rate, agility)
+            reduced = replace(kept, acceleration=kept.acceleration * (1.0 - now.excess))
+            return quickest_motion(path, reduced, rate, agility)
 
         tvist = None if at_once else lambda: self._filters.like(now.filter)
         try:
@@ -101,8 +101,8 @@ class MovePlanner(Fitter):
     def _lasting(self, path: JointLine, duration: float, now: PlanningState) -> MotionLimits:
         """Return limits with which a motion takes a duration [s], or the arm's if it takes longer anyway."""
         limits = arm_limits(self._description)
-        spared = replace(limits, acceleration=limits.acceleration * (1.0 - now.excess))
-        slower = min(quickest_motion(path, spared).duration / duration, 1.0)
+        reduced = replace(limits, acceleration=limits.acceleration * (1.0 - now.excess))
+        slower = min(quickest_motion(path, reduced).duration / duration, 1.0)
         if slower == 0.0:
             return limits
         return MotionLimits(

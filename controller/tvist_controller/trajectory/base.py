@@ -146,10 +146,10 @@ class Trajectory(ABC):
     def finished(self) -> bool:
         """Whether the last sample was the final one; all later ones are equal."""
 
-    def adapt(self, spared: Callable[[MotionLimits | None], MotionLimits]) -> None:  # noqa: B027  most need not
+    def adapt(self, reduced_limits: Callable[[MotionLimits | None], MotionLimits]) -> None:  # noqa: B027  most need not
         """Leave room for a new filter; needed only by references without a plan.
 
-        `spared(limits)` returns limits of a reference whose shaped reference keeps these and the arm's limits
+        `reduced_limits(limits)` returns limits of a reference whose shaped reference keeps these and the arm's limits
         (None: only the arm's).
         """
 

@@ -41,9 +41,9 @@ class Guided(Trajectory):
     def adopt(self, limits: MotionLimits) -> None:
         """Set other joint limits; call `pace` afterwards."""
 
-    def adapt(self, spared: Callable[[MotionLimits | None], MotionLimits]) -> None:
+    def adapt(self, reduced_limits: Callable[[MotionLimits | None], MotionLimits]) -> None:
         """See `Trajectory.adapt`."""
-        self.adopt(spared(None))
+        self.adopt(reduced_limits(None))
 
     @abstractmethod
     def pace(self, speed: float, slowest: float | None) -> None:

@@ -84,9 +84,9 @@ class SetpointStream(LimitedFollower):
         self.limited += self._limiter.limited
         return reference
 
-    def adapt(self, spared: Callable[[MotionLimits | None], MotionLimits]) -> None:
+    def adapt(self, reduced_limits: Callable[[MotionLimits | None], MotionLimits]) -> None:
         """Reduce the limits if the filter requires; see `Trajectory.adapt`."""
-        if (limits := spared(self.limits)) != self.limits:
+        if (limits := reduced_limits(self.limits)) != self.limits:
             self.adopt(limits)
 
     @property
