@@ -9,7 +9,7 @@ ALLOWED = 0.05  # residual vibration at which a mode counts as settled [-]
 
 
 def residual_over_error(shaper: Shaper, zeta: float, errors: Floats) -> Floats:
-    """Return the residual vibration over the unshaped one, for shares by which the assumed frequency is too high."""
+    """Return residual vibration relative to unshaped vibration, for fractions by which the assumed f_d is too high."""
     # `zeta` is both the assumed and the true damping ratio.
     return np.asarray(residual(1.0 / (1.0 + errors), zeta, shaper.impulses(1.0, zeta)))
 

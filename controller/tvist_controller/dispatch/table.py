@@ -1,4 +1,4 @@
-"""The table of commands, known without a robot because admission and planning use it in other threads."""
+"""The table of commands; it needs no robot, since admission and planning use it in other threads."""
 
 from typing import Any
 

@@ -105,7 +105,7 @@ def stop_has_room(
 ) -> bool:
     """Return whether all bodies certainly stay more than `least` [m] apart during a stop.
 
-    From each posture checked, time advances by as much as the bodies need at least to meet.
+    After each posture checked, time advances by the shortest time in which bodies could come that close.
     """
     n, time = q.shape[0], 0.0
     now, fastest, left = np.empty(n), np.empty(n), np.empty(n)

@@ -112,10 +112,10 @@ class StopPlanner:
     ) -> PathStop | None:
         """Return the quickest stop along a motion's path that is certain to be permitted, else None.
 
-        A stop is never ahead of the motion and rests no later if it brakes harder, with more jerk, than the
-        motion ever will, or if it ends before the motion could even at its hardest braking. No stop qualifies
-        if the motion is about to rest. For a motion that lasts long, any stop within the torque limits will
-        do, and need not be `certain`.
+        A permitted stop is never ahead of the motion and rests no later. This is certain if it brakes harder,
+        with more jerk, than the motion ever will, or ends before the motion could even at its hardest braking.
+        If the motion is about to rest, no stop qualifies. If the motion lasts long, any stop within the torque
+        limits is permitted, without `certain`.
         """
         speed, rise = forecast.path.forwards(state.qd), forecast.path.forwards(state.qdd)
         if (hardest := self._keeping(state, forecast, self.highest)) is None:
@@ -191,7 +191,7 @@ class StopPlanner:
     def by_joints(
         self, state: Target, wanted: float | None, clear: Callable[[JointStop], bool]
     ) -> JointStop | None:
-        """Return the quickest clear stop of independent joints within torque limits, at `wanted` [rad/s^2]."""
+        """Return a collision-free stop of independent joints within torque limits; try `wanted` [rad/s^2] first."""
         torque = StopTorque(self._dynamics, state, self._torque)
         stops = (self.stop(state, acceleration) for acceleration in self._ladder(wanted))
         within = (stop for stop in stops if (np.abs(stop.end) <= self._position).all())

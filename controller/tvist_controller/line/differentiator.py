@@ -100,7 +100,7 @@ class Differentiator:
 
     @property
     def newest(self) -> Target:
-        """State at the newest reference; a motion continued from it starts with this second difference."""
+        """State at the newest reference; a motion continued from it starts with the same acceleration."""
         return self._state(*self.window)
 
     def after(self, q: Floats) -> Target:

@@ -87,7 +87,7 @@ class ElasticFeedForward:
         self.limited = False  # whether the lead's acceleration was limited at the last tick
 
     def reset(self, stiction: Floats | float = 0.0) -> None:
-        """Restart with the lead of the next targets and the motors' stiction [N m]."""
+        """Restart from the next target's lead and the motors' given stiction [N m]."""
         self._ticks, self.limited = 0, False
         self.lead.drives[STICTION] = stiction
 

@@ -1,4 +1,4 @@
-"""Time laws of runs: limits of tool and joints, and the quickest law within them."""
+"""The quickest time law of a path between stops, within limits of tool and joints."""
 
 from dataclasses import dataclass
 from itertools import pairwise

@@ -101,7 +101,7 @@ def impulses_of(shaper: str, modes: Modes) -> Impulses:
 
 
 def options(stops: Sequence[StopWithRest]) -> list[Option]:
-    """Judge every shaper of the catalogue on stops that ring (at least one); shapers that fit none are left out."""
+    """Judge every catalogue shaper on one or more ringing stops; leave out shapers that cannot be judged on all."""
     return [
         option
         for aim in _aims(stops)

@@ -249,7 +249,7 @@ class Moves:
             text.line("break")
 
     def _retract(self, distance: str, acceleration: str) -> None:
-        """Move back to where the contact began, and further against the direction."""
+        """Move back to where contact began, then `distance` against the motion."""
         self._text.line("local touched=get_forward_kin(get_actual_joint_positions_history(steps_back))")
         self._text.line("local back=[towards[0], towards[1], towards[2]]")
         with self._text.block("if (norm(back) > 1e-6):"):
