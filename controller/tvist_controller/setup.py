@@ -153,7 +153,7 @@ class Setup:
         return made
 
     def standing(self, plant: Plant | None) -> "Setup":
-        """Return the setup for a plant; one that cannot be placed starts at its present position.
+        """Return the setup for a plant: a plant that cannot be placed starts at its present position.
 
         Raises:
             ValueError: See `measured_standing`.

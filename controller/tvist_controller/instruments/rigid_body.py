@@ -28,7 +28,7 @@ def cross(a: Sequence[float], b: Sequence[float]) -> list[float]:
 
 
 def carried(omega: list[float], alpha: list[float], arm: list[float]) -> list[float]:
-    """Return the acceleration of a point at r relative to another, α × r + ω × (ω × r) [m/s²]."""
+    """Return the acceleration of a point relative to another, α × r + ω × (ω × r) [m/s²]; `arm` is r."""
     return add(cross(alpha, arm), cross(omega, cross(omega, arm)))
 
 

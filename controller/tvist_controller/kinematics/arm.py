@@ -129,7 +129,7 @@ class Arm:
         return out
 
     def inverse(self, q: Floats) -> tuple[Floats, Floats]:
-        """Return the Jacobian and its pseudo-inverse without lost directions, shape (n, 6)."""
+        """Return the Jacobian and its pseudo-inverse (n, 6), zero in directions lost at a singular posture."""
         jacobian, inverse = self.jacobian(q), np.empty((len(q), 6))
         pseudo_inverse(jacobian, inverse)
         return jacobian, inverse
@@ -219,7 +219,7 @@ class InverseDynamics(Arm):
 
     @property
     def bodies(self) -> tuple[Floats, ...]:
-        """Possible inertial parameters (10,) of the last link: two sets during a payload change, else one."""
+        """Inertial parameters (10,) of the last link: both sets during a payload change, else the present one."""
         return (self._before, self._after) if self.changing else (self._after,)
 
     def believe(self, bodies: tuple[Floats, ...]) -> None:
@@ -234,7 +234,7 @@ class InverseDynamics(Arm):
         self._load(self._after)
 
     def effort(self, q: Floats, qd: Floats, qdd: Floats) -> Floats:
-        """Return the largest |τ| over all `bodies`, any of which may be right, shape (n,) [N m]."""
+        """Return the largest |τ| over all `bodies`, since any of these may be the true one, shape (n,) [N m]."""
         if self._ticks_left == 0:
             return np.abs(self.torque(q, qd, qdd))
         present, largest = self._present, np.zeros_like(q)

@@ -87,7 +87,7 @@ def _form(dh: Floats) -> float:
 
 @inlined
 def representation(angle: float, near: float, limit: float) -> float:
-    """Add whole turns to an angle to bring it nearest to `near` within ± limit, or if impossible to zero."""
+    """Add whole turns to an angle: nearest to `near` within ± limit or, if no value is within, nearest to zero."""
     turn = 2.0 * math.pi
     value = angle + turn * math.floor((near - angle) / turn + 0.5)
     if abs(value) <= limit:
@@ -102,7 +102,7 @@ def representation(angle: float, near: float, limit: float) -> float:
 
 @compiled
 def freedom_at(length: float) -> int:
-    """Return DEFINITE, LOOSE or FREE for the sine or length that determines an angle."""
+    """Return whether an angle is DEFINITE, LOOSE or FREE, from the sine or length that determines the angle."""
     if length < AT_BORDER:
         return FREE
     return LOOSE if length < AMPLIFIED else DEFINITE

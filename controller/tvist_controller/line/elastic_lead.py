@@ -93,7 +93,7 @@ def parts(memory: Floats) -> Lead:
 
 @compiled_for_ticks
 def move_back(lead: Lead, moved: Floats, back: Floats) -> None:
-    """Compute the joint turns that move the flange, J_jᵀ (J_j J_jᵀ + λ² E)⁻¹ moved; overwrite `moved`."""
+    """Compute the joint turns that move the flange by `moved`: J_jᵀ (J_j J_jᵀ + λ² E)⁻¹ moved; overwrite `moved`."""
     n = lead.joints.shape[0]
     square = np.zeros((3, 3))
     for row in range(3):
@@ -165,7 +165,7 @@ def lead_of(  # noqa: C901  a kernel: its branches are loops
     lead: Lead,  # its wanted leads are moved on by one
     target: Floats,  # q, q̇ and q̈, and τ* of the rigid arm, shape (4, n)
     first: bool,  # whether there was no tick before
-    smooth: bool,  # so that second differences say how bending links accelerate
+    smooth: bool,  # whether second differences give the accelerations of bending links
     memory: Floats,
     needed: Floats,  # result, shape (n,) [N m]
 ) -> None:
@@ -214,7 +214,7 @@ def follow(
     room: Floats,  # largest acceleration of each joint's lead, shape (n,) [rad/s^2]
     period: float,
 ) -> bool:
-    """Advance the actual lead, critically damped after a limit; return whether acceleration was limited."""
+    """Advance the actual lead; after a limitation it returns critically damped. Return whether it was limited now."""
     limited = False
     for j in range(led.shape[1]):
         now, before = led[0, j], led[1, j]

@@ -34,7 +34,7 @@ def arm_limits(description: RobotDescription) -> MotionLimits:
 
 
 def rate_of(speed: float, velocity: float, slowest: float | None) -> float:
-    """Return a motion's time rate [-]; `slowest` is the velocity limit of reduced mode, if active."""
+    """Return the time rate [-] of a motion with this largest velocity; `slowest` is reduced mode's limit, if active."""
     return speed if slowest is None else min(speed, slowest / velocity)
 
 
@@ -51,9 +51,9 @@ def keeps_torque(chain: Floats, q: Floats, qd: Floats, qdd: Floats, scratch: Flo
 
 @compiled_for_ticks
 def torque_room(chain: Floats, q: Floats, qd: Floats, scratch: Floats, most: Floats, share: float) -> float:
-    """Return the largest acceleration of all joints at once, any directions, within torques `most` [N m].
+    """Return the acceleration that all joints may have at once, in any directions, within torques `most` [N m].
 
-    Torque of the acceleration counts by the factor `share`; other arguments as `tvist_plant.chain.torques`.
+    The torque due to acceleration is multiplied by `share`; other arguments as in `tvist_plant.chain.torques`.
     """
     n, least = q.shape[0], math.inf
     found, M = np.zeros(n), np.empty((n, n))
@@ -70,8 +70,8 @@ def torque_room(chain: Floats, q: Floats, qd: Floats, scratch: Floats, most: Flo
 class StreamTorqueMargin:
     """Acceleration of a stream or guided motion within the joint torques left by gravity and velocity.
 
-    A guided motion may change suddenly, as no filter smooths it. The flexible arm's torque then overshoots by
-    the fraction `rebound`, and must also stay within the limits.
+    An unshaped guided motion may change suddenly. The torque of the flexible arm then overshoots that of the rigid
+    arm by the fraction `rebound`, and must also stay within the limits.
     """
 
     def __init__(
@@ -82,7 +82,7 @@ class StreamTorqueMargin:
         self._dynamics = dynamics
 
     def allows(self, q: Floats, qd: Floats, qdd: Floats) -> bool:
-        """Return whether a state keeps all torques, or is as gentle as any stop."""
+        """Return whether a state keeps all torque limits, or has at most the acceleration of the gentlest stop."""
         swung = (1.0 + self._rebound) * qdd
         keeps = self._keeps(q, qd, qdd, self._most) and (
             self._rebound == 0.0 or self._keeps(q, qd, swung, self._limits)
@@ -116,8 +116,8 @@ class StreamTorqueMargin:
 class StopTorque:
     """Joint torques available to a stop from a state.
 
-    The rigid arm's torques stay within their share of the limits, or, if larger, within those of the
-    uninterrupted motion (`asked`, by default the torque at the start).
+    The rigid arm's torques stay within a share of the limits. If the uninterrupted motion needs more (`asked`, by
+    default the torque at the start), they stay within that instead.
     """
 
     def __init__(
@@ -133,9 +133,9 @@ class StopTorque:
     def holds(self, stop: AnyStop, *, rebound: bool = True) -> bool:
         """Return whether a stop keeps these torques and, with `rebound`, its overshoot keeps the limits.
 
-        Torque peaks where a joint's acceleration ramp ends, hence 32 moments. Nine in ten failing stops fail
-        at the end of the whole stop's ramp; the next stop mostly fails where the last one did. These two
-        moments are checked first.
+        Torque peaks where a joint's acceleration ramp ends, so 32 moments are checked. Two come first: the end of the
+        ramp to the full deceleration, where nine in ten failing stops fail; and the moment at which the previous stop
+        failed, since the next one mostly fails there, too.
         """
         ramp = stop.acceleration / stop.jerk
         ends = min(math.ceil(ramp / stop.duration * MOMENTS), MOMENTS) if stop.duration > 0.0 else MOMENTS

@@ -20,8 +20,8 @@ G = TypeVar("G", bound=Guided)
 class Guidance:
     """Starts guided motions, from rest or by taking over a motion, and stops them.
 
-    They are unshaped unless the first command requests shaping at rest. An unshaped one starts from the
-    newest shaped reference of any motion. Further commands continue from the reference of the previous one.
+    A guided motion is unshaped unless its first command comes at rest and requests shaping. An unshaped one
+    starts from the newest shaped reference of any motion. Later commands continue the same reference.
     """
 
     def __init__(self, motion: MotionControl) -> None:
@@ -90,7 +90,7 @@ class Guidance:
         self._halt(trigger, stop, stop.duration)
 
     def stop_tool(self, acceleration: float, angular_acceleration: float) -> None:
-        """Come to rest with a deceleration of the tool, straight if `speed_l` moves it [m/s^2, rad/s^2]."""
+        """Come to rest with a deceleration of the tool [m/s^2, rad/s^2]; a tool moved by `speed_l` stays straight."""
         cycle = self._cycle
         state, present, tool = cycle.newest, cycle.trajectory, self.motion.tool
         fastest, twist = float(np.abs(state.qd).max()), tool.jacobian(state.q) @ state.qd
@@ -114,13 +114,13 @@ class Guidance:
         return self._cycle.filter.reduced_limits(self.limits) if shaped else self.limits
 
     def check(self, trigger: str, *, shaped: bool = False) -> None:
-        """Raise RefusalError if the present activity does not allow a command."""
+        """Raise RefusalError if a command is not allowed now, or wants shaping that could only begin at rest."""
         self.motion.check(trigger)
         if shaped and self.motion.activity is not Activity.REST and not self._continues(shaped):
             raise invalid("shaped", "true", "false, since this motion does not begin at rest", code="busy")
 
     def _continues(self, shaped: bool) -> bool:
-        """Return whether a command continues the previous one's reference."""
+        """Return whether a command continues the reference of the previous command."""
         return self.motion.activity is Activity.GUIDED and shaped == self._cycle.mode.shaped
 
     def _present(self, kind: type[G], shaped: bool) -> G | None:
@@ -136,25 +136,25 @@ class Guidance:
 
     @property
     def guided(self) -> Guided | None:
-        """The present guided motion, inside a compliant one if any; None if none can continue."""
+        """The present guided motion, also if it is part of a compliant motion; None without one."""
         lead = self.compliant
         found = self._cycle.trajectory if lead is None else lead.inner
         return found if self.motion.activity is Activity.GUIDED and isinstance(found, Guided) else None
 
     @property
     def reference(self) -> Floats:
-        """Position from which the next motion starts, without compliance, shape (n,) [rad]."""
+        """Joint positions of the present reference without the effect of compliance, shape (n,) [rad]."""
         return self._cycle.sample.reference if self.compliant is None else self.compliant.nominal
 
     @property
     def resting(self) -> bool:
-        """Whether nothing moves except by compliance."""
+        """Whether no motion is commanded; compliance may still move the arm."""
         lead = self.compliant
         return not self.motion.activity.moving if lead is None else lead.inner.finished
 
     @property
     def state(self) -> tuple[Floats, Floats, Floats]:
-        """Position, velocity and acceleration of the present reference, where an unshaped one starts."""
+        """Position, velocity and acceleration from which a new unshaped motion starts."""
         return self._start(shaped=False) if self.compliant is None else self.compliant.state
 
     def stand(self, deceleration: float) -> None:
@@ -171,7 +171,7 @@ class Guidance:
         return stop
 
     def slow_down(self) -> None:
-        """End a commanded velocity until the next command; a commanded posture may stay."""
+        """Until the next command, bring a motion with commanded velocity to rest; a commanded posture stays."""
         if isinstance(present := self.guided, Speed):
             present.come_to_rest()
 
@@ -188,7 +188,7 @@ class Guidance:
         return newest.q, newest.qd, newest.qdd
 
     def follow(self, trigger: str, trajectory: Guided, *, shaped: bool = False) -> int:
-        """Start a trajectory, in the other axes of a compliant motion if any; return the motion's number."""
+        """Start a trajectory, during a compliant motion in its stiff axes; return the motion's number."""
         motion, cycle, guard, lead = self.motion, self._cycle, None, self.compliant
         if lead is not None and trajectory is not lead:
             lead.take(trajectory)

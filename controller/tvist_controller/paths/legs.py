@@ -77,7 +77,7 @@ class LegSpeed:
     even: bool = False  # whether blends keep the tool's speed, so that only the joints limit acceleration
 
     def meeting(self, other: "LegSpeed") -> "LegSpeed":
-        """Return the pacing of a blend between two parts."""
+        """Return the speed limits of a blend between two parts."""
         return replace(
             self,
             velocity=min(self.velocity, other.velocity),
@@ -99,7 +99,7 @@ class Leg:
 
     @property
     def q(self) -> Floats:
-        """Joint positions at its start, shape (n,) [rad]."""
+        """Joint positions at the start of the leg, shape (n,) [rad]."""
         return np.asarray(self.knots.q[0])
 
 
@@ -147,7 +147,7 @@ def _meeting(leg: Leg, blend: float, before: Floats, behind: Floats) -> BlendJun
 
 
 def _between(one: Floats, other: Floats) -> Floats:
-    """Return a curvature between two: their mean, limited by the smaller; 0 if they bend apart."""
+    """Return a curvature between two: their mean, limited by the smaller; 0 if they bend in opposite directions."""
     if one @ other <= 0.0:
         return np.zeros_like(one)
     mean = 0.5 * (one + other)

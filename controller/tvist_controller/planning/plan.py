@@ -1,4 +1,4 @@
-"""Rows of the command table, and plans for commands that take too long for a tick: creation and validity."""
+"""Rows of the command table; creation and validity of plans for commands that take too long for a tick."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, Generic, Literal, NamedTuple, Protocol, TypeVar
@@ -32,9 +32,9 @@ class Planning(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """Result of planning a command, valid while the underlying state holds."""
+    """Result of planning a command, valid while the state that the plan depends on stays equal."""
 
-    state: Mapping[str, Any]  # fields of the snapshot that it depends on
+    state: Mapping[str, Any]  # fields of the snapshot that the plan depends on
     found: Found | RefusalError  # what was planned, or the refusal; None if no motion may start
     until: float = 0.0  # see `PlanningState.until`
 
@@ -66,7 +66,7 @@ class MakesPlans(Protocol):
 
 
 class Plans:
-    """Plans of one robot, made now or outside the ticks, for commands of clients and programs.
+    """Makes the plans of one robot, now or outside the ticks, for commands of clients and programs.
 
     `plan` is `Planner.plan`. `snapshot` returns the present state or, with a time [s], that of a motion that continues
     the running one after this time. `order` plans outside the ticks; without it, the tick that needs a plan makes it.
@@ -120,14 +120,14 @@ class CommandCall(NamedTuple, Generic[C]):
     command: C
     tick: int  # number of the next control period
     now: float  # time; only ticks advance it [s]
-    session: str | None  # session of the client that gets control, if `client_gone` will report its end
+    session: str | None  # session of the client that gets control; None if `client_gone` will not report its end
     planned: Callable[[], Any]
     """Returns the plan, making it if necessary; raises `RefusalError` if the command is impossible."""
     origin: str | None = None  # IP address of the sender; None if unknown
 
 
 class CommandRow(NamedTuple):
-    """One type of command: how a controller carries it out, and what that needs.
+    """One type of command: how a controller carries out the command, and what it needs for that.
 
     The protocol's table of transitions defines which commands move the arm, and when each is allowed.
     """

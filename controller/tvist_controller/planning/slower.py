@@ -1,4 +1,4 @@
-"""Messages about motions slower than requested: the limit responsible, unless the way is just too short."""
+"""Messages that name the limit that makes a motion slower than requested; none if only the way is too short."""
 
 from typing import NamedTuple
 
@@ -57,7 +57,7 @@ JERKS = Binding("limit_acceleration", "tool and joints stay within the limits of
 def slower_path(
     run: Run, curve: SplineCurve, law: RetimedLaw, limits: JointLimits, description: RobotDescription
 ) -> Limited | None:
-    """Return the limit that prevents the speed or duration of a one-segment motion; None if just too short."""
+    """Return the limit that prevents a one-segment motion's speed or duration; None if only its way is too short."""
     pacing, way = run[0].pacing, float(curve.end[0])
     if pacing.duration is not None:
         if law.duration <= DURATION_TOLERANCE * pacing.duration:
@@ -100,5 +100,5 @@ def longer_joint_motion(motion: PlannedMotion, asked: float) -> Limited | None:
 
 
 def lasts(duration: float, asked: float) -> str:
-    """Return words for a duration other than requested [s]."""
+    """Return a message about a duration other than requested [s]."""
     return f"duration is {duration:.4g} s instead of {asked:.4g}"

@@ -22,7 +22,7 @@ SAME = 1e-9  # distance below which two knots are one [m]
 
 @dataclass(frozen=True)
 class ExtensionEdges:
-    """Edges of a law at which it is cut for an extension."""
+    """Edges at which a time law is cut for an extension."""
 
     first: int  # first one kept
     known: int  # last one up to which the law stays unchanged
@@ -42,11 +42,11 @@ class ExtendableMotion:
 
     @property
     def end(self) -> Floats:
-        """Joint positions at its end, shape (n,) [rad]."""
+        """Joint positions at the motion's end, shape (n,) [rad]."""
         return self.curve.posture(self.curve.end)
 
     def branch(self, until: float) -> tuple[ExtensionEdges, Branch] | None:
-        """Return the first point after a time [s] at which it may change, and its cuts; None if too late."""
+        """Return cuts and point of the first possible change of the motion after a time [s]; None if too late."""
         law, edges = self.law, self.law.edges
         moment = until * law.rate
         known = int(np.searchsorted(law.times, moment))
@@ -58,7 +58,7 @@ class ExtendableMotion:
             if at >= known:
                 return ExtensionEdges(first, known, at), replace(branch, s=float(edges[at]))
         last, s = self.branches[-1], float(edges[known])
-        begun = last.begun + s - last.s  # the arm is on its last leg already
+        begun = last.begun + s - last.s  # the arm is already on the last leg
         return ExtensionEdges(first, known, known), Branch(
             s, last.legs, begun, self.curve.posture(np.array([s]))
         )

@@ -63,9 +63,9 @@ class RateLimit:
 class BlendedMoves:
     """The blended moves of one thread, and the motion along them.
 
-    The motion starts when the last move is known, or as many as are planned together; `step` continues it
-    every tick while the thread adds moves. Each plan ends at rest, so the arm stops where no further move
-    comes in time. `rest` stops other motion and waits until a motion may start.
+    The motion starts when the last move is known, or when the most moves that are planned together wait. `step`
+    continues it every tick while the thread adds moves. Each plan ends at rest, so the arm stops where the next
+    move comes too late. `rest` stops other motion and waits until a motion may start.
     """
 
     def __init__(
@@ -74,7 +74,7 @@ class BlendedMoves:
         self._access, self._motion, self.owner = access, access.motion, owner
         self._rate_limit, self._rest = rate_limit, rest
         self.legs: list[Segment] = []  # moves not yet passed by the arm
-        self._effects: list[list[Effect]] = []  # effects of the program after each of them
+        self._effects: list[list[Effect]] = []  # effects of the program after each of these moves
         self.closed = False  # whether no more moves will come
         self.number: int | None = None  # number of the motion while it runs
         self.outcome: str | None = None  # event that ended it
@@ -110,16 +110,16 @@ class BlendedMoves:
 
     @property
     def begun(self) -> bool:
-        """Whether it has started."""
+        """Whether the motion has started."""
         return self._steps is not None
 
     def hand_over(self) -> list[tuple[Segment, list[Effect]]]:
-        """Return the remaining moves and effects for another to carry out."""
+        """End these moves; return the remaining ones with their effects, to be carried out by force control."""
         self.over = True
         return list(zip(self.legs, self._effects, strict=True))
 
     def stop(self) -> None:
-        """Record a protective stop; what it passes counts as passed on resuming."""
+        """Record a protective stop. When the program resumes, moves up to the arm's place of rest count as passed."""
         move = self._motion.motions.move
         self.outcome, self._stops_at = "protective_stop", None if move is None else move.stops_at
 
@@ -189,7 +189,7 @@ class BlendedMoves:
         self._count = len(legs)
 
     def _planned(self, legs: list[Segment]) -> Generator[None, None, Plan]:
-        """Plan moves; lines, paths and joint moves in debt start a fixed time after the order."""
+        """Plan moves: joint moves at once; lines, paths, and joint moves in debt a fixed time after the order."""
         plans, command = self._access.plans, self._command(legs)
         if isinstance(command, MoveJ) and self._rate_limit.debt < PAUSE:
             self._rate_limit.charge()
@@ -239,7 +239,7 @@ class BlendedMoves:
         return True
 
     def _pass_blends(self, progress: tuple[int, float] | None) -> None:
-        """Apply effects behind blends that the arm has started, see `progress`."""
+        """Apply the effects of each blend that the arm has begun, see `RunningMove.progress`."""
         while progress is not None and len(self._marks) > 1 and progress > self._marks[0]:
             del self._marks[0]
             self._pass(1)
@@ -256,7 +256,7 @@ class BlendedMoves:
             self._motion.check("move_j")
 
     def _refused(self, refusal: RefusalError, legs: list[Segment]) -> None:
-        """End a program whose move is impossible, or stop the robot for an unreachable line or path."""
+        """For a refused move, end the program; for an unreachable line or path, make a protective stop."""
         reply = refusal.reply
         if isinstance(command_of(legs), MoveJ) or reply.code not in _UNREACHABLE:
             raise Fault(reply.why)
