@@ -135,7 +135,7 @@ class PathLimits(NamedTuple):
         places = np.concatenate((self.places[first : last + 1], further.places[1:]))
         pairs = zip(self[1:], further[1:], strict=True)
         ground = PathLimits(places, *(np.concatenate((own[first:last], other)) for own, other in pairs))
-        if last > first:  # a spline's third derivative at a knot is that behind the knot, which has changed here
+        if last > first:  # a spline's third derivative at a knot is that behind it, which has changed here
             looks = _looks(self.places[last - 1 : last + 1])
             ground.third[last - first - 1] = _largest(np.abs(curve.third(looks))).max()
         return ground

@@ -85,8 +85,8 @@ class Fitter:
     ) -> Fitted:
         """Plan a motion; while it exceeds a limit, plan it again more slowly.
 
-        Near a limit, the motion is shaped in advance by the filter from `tvist`. If that takes too long, pass None: then
-        the filter's `surplus` is kept free. `limits` are the requested ones; None if something else sets the speed.
+        Near a limit, the motion is shaped in advance by the filter from `tvist`. With None, to save time, the filter's
+        `surplus` is kept free instead. `limits` are the requested ones; None if something else sets the speed.
         """
         asked, need, slower = make(AS_ASKED), None, AS_ASKED
         motion = asked

@@ -120,7 +120,7 @@ class CommandCall(NamedTuple, Generic[C]):
     command: C
     tick: int  # number of the next control period
     now: float  # time; only ticks advance it [s]
-    session: str | None  # session of the client that gets control; None if `client_gone` will not report its end
+    session: str | None  # session of the client that gets control, if `client_gone` will report its end
     planned: Callable[[], Any]
     """Returns the plan, making it if necessary; raises `RefusalError` if the command is impossible."""
     origin: str | None = None  # IP address of the sender; None if unknown

@@ -1,4 +1,4 @@
-"""A reference that complies with forces at the tool, while another moves it in the other directions."""
+"""A reference that complies with forces at the tool in some axes; in the others, another reference moves the tool."""
 
 import math
 from collections.abc import Callable
@@ -47,8 +47,8 @@ def compliant_velocity(task: ForceTask, velocity: Floats, felt: Floats) -> Float
     """Return the velocity of the frame's axes a tick later, shape (6,) [m/s, rad/s].
 
     A compliant axis is a virtual mass with damping, M v̇ = g (w + f) - D v, with wanted wrench w, measured
-    wrench f (6,) [N, N m] and gain g, integrated implicitly, so any damping is stable. In contact D is at
-    least that of contact. A stiff axis loses the speed of its compliance.
+    wrench f (6,) [N, N m] and gain g, integrated implicitly, so any damping is stable. In contact, D rises to at
+    least `contact_damping`. An axis that has become stiff loses its earlier compliant velocity gradually.
     """
     scale = np.repeat([1.0, LEVER * LEVER], 3)
     touched = np.minimum(np.abs(felt) / np.repeat([CONTACT, CONTACT * LEVER], 3), 1.0)
@@ -63,11 +63,11 @@ def compliant_velocity(task: ForceTask, velocity: Floats, felt: Floats) -> Float
 
 
 class Compliant(LimitedFollower):
-    """Moves the tool by force control in compliant axes, and as another reference does in stiff ones.
+    """Moves the tool by force control in compliant axes, and as an inner reference does in stiff axes.
 
-    The tracked pose P is integrated from twists along the task's axes: the force law's velocity where compliant, that
-    of the inner reference's tool elsewhere. The joints follow P by Newton's method and a `Limiter`. Compliance that
-    joint limits or singular postures prevent is dropped from P, so that nothing is caught up later.
+    A pose P is integrated from velocities along the task's axes: in compliant axes the force law's, in stiff axes that
+    of the inner reference's tool. The joints follow P by Newton's method and a `Limiter`. If joint limits or singular
+    postures prevent a compliant motion, it is removed from P, so that nothing is caught up later.
     """
 
     finished = False  # it ends by a command
@@ -116,7 +116,7 @@ class Compliant(LimitedFollower):
 
     @property
     def task(self) -> ForceTask:
-        """The task."""
+        """The present task."""
         assert self._task is not None, "it is aimed before it moves"
         return self._task
 
@@ -135,7 +135,7 @@ class Compliant(LimitedFollower):
         super().adopt(abrupt(limits))
 
     def pace(self, speed: float, slowest: float | None) -> None:
-        """Set the speed of the inner reference, and the velocity limit of both."""
+        """Set the speed of the inner reference, and the velocity limit of inner and compliant reference."""
         self._speed = speed, slowest
         self.inner.pace(speed, slowest)
         super().pace(speed, slowest)
@@ -174,7 +174,7 @@ class Compliant(LimitedFollower):
         return reached
 
     def _move_inner(self) -> Floats:
-        """Advance the inner reference by a tick; return its tool velocity, shape (6,)."""
+        """Advance the inner reference by a tick; return the tool velocity that it commands, shape (6,)."""
         if self.inner.finished:
             self._moved = np.zeros(6)
             return self._moved
@@ -187,7 +187,7 @@ class Compliant(LimitedFollower):
         return turned(pose[0], way[3:]), pose[1] + way[:3]
 
     def _drop(self, q: Floats, axes: Floats) -> None:
-        """Drop what the joints did not follow in compliant axes."""
+        """Remove from the tracked pose the compliant motion that the joints did not follow."""
         rotation, position = self.kinematics.pose(q)
         off = np.concatenate((self._pose[1] - position, turn(rotation, self._pose[0])))
         lost = np.where(self.task.compliant > 0.0, _into(axes, off), 0.0)

@@ -47,7 +47,7 @@ class PlayOut:
 
     @property
     def delay(self) -> float:
-        """Time from arrival of the earliest set-points to their play-out [ticks]."""
+        """Time from arrival to play-out of the set-points that come earliest relative to their number [ticks]."""
         return self._lags[2] - self._earliest
 
     @property
@@ -57,7 +57,7 @@ class PlayOut:
         return self._origin, round((self._now - self._lags[2]) / self._ticks, 9)
 
     def breaks(self, sequence: int) -> bool:
-        """Return whether a set-point that arrived before the coming tick is far from its expected time."""
+        """Return whether a set-point that arrives for the coming tick is far from its expected time."""
         return abs(self._lateness(sequence) - self._earliest) > self._most
 
     def _lateness(self, sequence: int) -> float:
@@ -82,7 +82,7 @@ class PlayOut:
             self._wanted = wanted
 
     def advance(self, speed: float, behind: float) -> None:
-        """Advance by one tick at the fastest joint's velocity [rad/s]; `behind`: the reference's lag [s]."""
+        """Advance by one tick; `speed` is the fastest joint's velocity [rad/s], `behind` the reference's lag [s]."""
         self._now += 1
         delay = self._lags[2]
         if behind > 0.0:

@@ -97,7 +97,7 @@ class SetpointStream(LimitedFollower):
 
     @property
     def delay(self) -> float:
-        """Time from arrival of the earliest set-points until the curve reaches them [s]."""
+        """Time from arrival of set-points that come early until the curve reaches them [s]."""
         return 0.0 if self._play_out is None else self._play_out.delay * PERIOD
 
     def _receive(self) -> None:
@@ -121,7 +121,7 @@ class SetpointStream(LimitedFollower):
                 self.late += 1
 
     def _restart(self, newest: int) -> PlayOut:
-        """Continue with the newest set-point; other waiting ones become the curve's last points."""
+        """Continue with the newest set-point, after putting all others that wait on the curve."""
         self._head = self._real[-1][0]
         for sequence in sorted(self._waiting):
             if sequence != newest:
@@ -143,7 +143,7 @@ class SetpointStream(LimitedFollower):
         return q, qd
 
     def _complete(self, needed: int) -> bool:
-        """Extend the curve to a number if there are points for it; return whether there are."""
+        """Extend the curve to the sequence number `needed`; return False if there are not enough points."""
         while self._head < needed:
             missing = self._head + 1
             if self._waiting:
@@ -192,7 +192,7 @@ def linear(
     u: float,  # place between the last two, 0 < u ≤ 1; at 1 the value is exactly the last point [-]
     rate: float,  # of u [1/s]
 ) -> tuple[Floats, Floats, float]:
-    """Interpolate linearly, with the slope of a parabola; return the value, its derivative, and the largest slope."""
+    """Interpolate linearly; return value, derivative (of a parabola, which has no steps), and largest derivative."""
     found = np.empty((2, len(points[0])))
     fastest = on_parabola(points[1], points[2], points[3], u, rate, found)
     return found[0], found[1], fastest
