@@ -113,7 +113,7 @@ class Watchdogs:
         self._tick = 0
 
     def watch(self, name: str, frequency: float, action: str) -> None:
-        """Watch that an RTDE input is written at a frequency [Hz]; else do `action`: `pause` or `stop`; `ignore` ends this."""
+        """Watch that an RTDE input is written at `frequency` [Hz]; else `pause` or `stop`. `ignore` ends the watch."""
         bank, place = _register(name)
         self._peripherals.changed = True
         if action == "ignore":

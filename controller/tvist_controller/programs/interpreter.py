@@ -143,7 +143,7 @@ class StatementQueue:
         return self._interpreted
 
     def _check_room(self, length: int, *, clears: bool) -> None:
-        """Refuse a statement that makes the program too large; with statements to be cleared, twice the size may be held."""
+        """Refuse a statement that makes the program too large; including statements not yet cleared, twice as large."""
         held = [characters for _, characters in self._lengths]
         added = [characters for number, characters in self._lengths if number > self._forgotten]
         full = len(held) >= HELD * MAX_STATEMENTS or sum(held) + length > HELD * MAX_SCRIPT
