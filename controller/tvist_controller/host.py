@@ -77,7 +77,7 @@ class Host:
         except Exception as error:  # noqa: BLE001  see `survives`
             self._note(entry)  # needed to reproduce the error
             return Refused(code="plant_failure", where="", why=self._stop_for(error))
-        self._carry_out_orders()  # of programs that it has ended
+        self._carry_out_orders()  # socket orders of programs that the command has ended
         # A command of the client in control renews the lease even if it is refused; another client's does not.
         if not isinstance(reply, Refused) or is_holders(
             self.controller.session.lease, getattr(command, "token", None)

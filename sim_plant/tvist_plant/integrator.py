@@ -153,7 +153,7 @@ def advance(arm: ArmMemory, head: Floats) -> None:  # noqa: C901, PLR0912, PLR09
     bias, last_bias = arm.dynamics[NOW, links], arm.dynamics[LAST, links]
     springs, f = arm.springs, arm.force
     h = period / substeps
-    sticks = False  # keeps arms without stiction fast
+    sticks = False  # whether any motor has stiction; without it, the loops below are faster
     for j in range(n):
         joint = of_joint(arm.joints, j)
         sticks = sticks or joint.stiction > 0.0 or joint.stiction_load > 0.0

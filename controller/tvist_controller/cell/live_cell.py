@@ -149,7 +149,7 @@ class LiveCell:
             return
         if self._held is not None:
             self._put_down(q)
-            self._share = 0  # it stays with the tool
+            self._share = 0  # the part stays with the removed tool
         self._tool = tool
         own = Payload(mass=tool.mass, com=tool.cog, inertia=tool.inertia)
         self._load = self.empty if tool is self._cell.tools[0] else own

@@ -31,10 +31,10 @@ class LineParameters:
         source: ModeSource,
         motion: MotionControl,
         peripherals: Peripherals,
-        plan: Callable[[PayloadLesson, FilterState], Plan],  # plans what a lesson changes
+        plan: Callable[[PayloadLesson, FilterState], Plan],  # plans the change that a lesson requires
         emit: Emit,
         *,
-        follows: bool,  # whether the robot follows its payload
+        follows: bool,  # whether the robot learns its payload from its motions
     ) -> None:
         self.declared = payload
         self.assumed = payload  # payload for dynamics and modes: the declared or the learnt one

@@ -15,7 +15,7 @@ class Lease(NamedTuple):
     client: str
     token: str
     session: str | None
-    """Session whose end ends it; empty if the client's token does not name it, None without a token."""
+    """Session whose end ends the hold; empty if the client's token names no session, None without a token."""
     seconds: float = math.inf
     """Duration without renewal [s]; infinite for the clock, since nothing times out in simulated time."""
 

@@ -43,7 +43,7 @@ class RobotParts(ABC):
     """The parts of one robot, on which commands act; a `Controller` creates them."""
 
     def __init__(self, setup: Setup, plant: Plant | None, planner: MakesPlans, order: Order | None) -> None:
-        self.setup = setup  # initial setup; for an arm that cannot be placed, with its initial posture
+        self.setup = setup  # initial setup; if the arm cannot be placed, `q` is its measured initial posture
         self.tick_number = 0
         self.counters = Counters()
         self.events: list[Event] = []  # events of the present tick, or of the next one between ticks

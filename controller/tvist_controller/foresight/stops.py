@@ -84,7 +84,7 @@ ROUNDING = 1e-12  # position differences below this are rounding errors [rad]
 class StopPlan:
     """A stop and its limits."""
 
-    trajectory: AnyStop | None  # trajectory of the stop; None if the present motion runs out
+    trajectory: AnyStop | None  # trajectory of the stop; None if the present motion runs to its end
     acceleration: float | None  # acceleration limit of the stop, None for the motion's own [rad/s^2]
     limited: bool  # whether the limit differs from the requested one
     duration: float | None  # time until rest, None if too far ahead [s]

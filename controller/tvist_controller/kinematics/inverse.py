@@ -16,10 +16,10 @@ from tvist_plant.model import Floats
 
 FOUND, NO_SOLUTION, OUT_OF_RANGE = 0, 1, 2
 ON_CURVE = 4
-"""Added to these if a joint is free and a curve of postures was searched, which takes many times longer."""
+"""Added to FOUND etc. if a joint is free and a curve of postures was searched, which takes many times longer."""
 
 SAMPLES = 96  # values of a free angle at which postures are computed before the nearest are refined
-SPREAD = (53, 59)  # order of those of the second and third angle; any two angles then fill a square evenly
+SPREAD = (53, 59)  # steps of the second and third free angle; any two angles then fill a square evenly
 
 OUTSIDE = 1e6  # Penalty on the squared distance of a posture outside a joint's range [rad^2]
 

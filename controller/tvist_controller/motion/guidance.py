@@ -179,7 +179,7 @@ class Guidance:
         cycle, lead = self._cycle, self.compliant
         if self._continues(shaped) and (present := self.guided) is not None:
             return present.state
-        if lead is not None:  # its inner reference is at rest
+        if lead is not None:  # the inner reference of the compliant motion is at rest
             return lead.nominal, np.zeros_like(lead.nominal), np.zeros_like(lead.nominal)
         if cycle.mode.at_rest:
             q = cycle.sample.reference if shaped else cycle.position

@@ -89,7 +89,7 @@ class RunningMove:
         if present is None or forecast is None or forecast.path is not self._trajectory.path:
             return None
         if self._held and self._cycle.trajectory is self._trajectory:
-            return present  # paused: it does not continue to its end
+            return present  # paused: the motion does not continue to its end
         return present[0], float(forecast.end[0])
 
     @property
@@ -104,7 +104,7 @@ class RunningMove:
 
     def hold(self) -> None:
         """Pause within torque limits unless the motion ends sooner; see `PlannedMotion.hold`."""
-        if self._held or self._cycle.mode.at_rest:  # at rest, it is between two parts
+        if self._held or self._cycle.mode.at_rest:  # at rest: the motion is between two parts
             return
         trajectory, cycle = self._trajectory, self._cycle
         most = trajectory.agility.acceleration

@@ -20,8 +20,8 @@ from tvist_controller.trajectory.spline import Knots
 LOOKS, HALVINGS = 64, 40
 """Places at which a distance from an end is checked, and bisections of the step in which it is exceeded."""
 OFF = 1e-5  # largest deviation from a line where two blends meet, outside their radii [m]
-SHALLOW = 0.3  # largest turn of the path at a corner next to such a line [rad]
-STEEPER = 1.5  # largest ratio of the curvature where two blends meet to the smaller of both [-]
+SHALLOW = 0.3  # largest turn of the path at a corner whose blend may be extended to meet another [rad]
+STEEPER = 1.5  # largest ratio of the curvature where two blends meet to the smaller one of the blends [-]
 
 
 @dataclass(frozen=True)
@@ -141,7 +141,7 @@ def _meeting(leg: Leg, blend: float, before: Floats, behind: Floats) -> BlendJun
     bend = np.concatenate([_between(before[part], behind[part]) for part in (slice(3), slice(3, 6))])
     along = way.first[:3]
     speed = float(along @ along)
-    if speed > 0.0:  # the path is curved there, and not sped up
+    if speed > 0.0:  # keep only the part across the path: the blends meet with curvature but constant speed
         bend[:3] -= (bend[:3] @ along / speed) * along
     return BlendJunction(0.5 * (start + end), bend)
 

@@ -15,8 +15,8 @@ from tvist_controller.trajectory.spline import Knots, SplineCurve
 
 FINEST, CELLS = 5e-4, 400  # smallest cell length [m], and largest number of cells of a run
 MARGIN = 1.01  # factor by which a derivative may exceed its samples within a cell [-]
-FASTEST = 1e3  # largest factor of speeding up for a duration; the joints then limit by far [-]
-JOLT_SHARE = 0.3  # fraction of joint jerk available to each effect of the curve [-]
+FASTEST = 1e3  # largest speed-up factor for a requested duration; joint limits apply long before [-]
+JOLT_SHARE = 0.3  # fraction of joint jerk available to each of the two jerk terms of the curve's shape [-]
 BRIEFEST = 1e-3  # shortest duration planned for [s]
 TRIES = 4  # attempts to plan an extended motion more slowly after slightly exceeding limits
 MOMENTS = 500  # number of moments at which a motion's velocity is checked
@@ -45,7 +45,7 @@ def joined(run: Run, before: Knots | None = None) -> Knots:
 
 def law_of(
     run: Run,
-    curve: SplineCurve,  # the joints' way along it
+    curve: SplineCurve,  # the joints' motion along the run
     ground: "PathLimits",
     limits: JointLimits,
     jerk: float,  # largest along the path [m/s^3]
@@ -70,13 +70,13 @@ def law_of(
 
 def going_on(
     before: RetimedLaw,
-    edges: tuple[int, int],  # number of its edge with which the law begins, and of equal ones behind that
-    ground: "PathLimits",  # from that edge on
+    edges: tuple[int, int],  # edge of `before` at which the law begins, and number of equal edges behind it
+    ground: "PathLimits",  # limits from that edge on
     curve: SplineCurve,
     limits: JointLimits,
     jerk: float,
     window: float,
-    slower: float,  # factor of its speed, at most 1 [-]
+    slower: float,  # factor of the law's speed, at most 1 [-]
 ) -> RetimedLaw | None:
     """Return the quickest law that extends another; see `longer_law`, other arguments as in `law_of`."""
     first, known = edges
@@ -123,8 +123,8 @@ class PathLimits(NamedTuple):
 
     places: Floats  # cell boundaries, shape (c + 1,) [m]
     speed: Floats  # requested tool speed, shape (c,) [m/s]
-    p: Floats  # fraction of its acceleration limit per unit of s̈, shape (c,) [s^2/m]
-    q: Floats  # fraction of its acceleration limit per unit of ṡ², shape (c,) [s^2/m^2]
+    p: Floats  # fraction of the tool's acceleration limit per unit of s̈, shape (c,) [s^2/m]
+    q: Floats  # fraction of the tool's acceleration limit per unit of ṡ², shape (c,) [s^2/m^2]
     slope: Floats  # bound of |dq/ds|, shape (c, n) [rad/m]
     second: Floats  # bound of |d²q/ds²|, shape (c, n) [rad/m^2]
     third: Floats  # bound of |d³q/ds³| of any joint, shape (c,) [rad/m^3]

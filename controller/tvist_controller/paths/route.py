@@ -51,8 +51,8 @@ class _Cut:
 class Branch:
     """Point of a run from which further legs may change the rest."""
 
-    s: float  # length of the run up to it [m]
-    legs: tuple[Leg, ...]  # legs from it on
+    s: float  # length of the run up to the point [m]
+    legs: tuple[Leg, ...]  # legs from the point on
     begun: float  # length of the first of these legs before the point [m]
     q: Floats  # joint positions there, shape (n,) [rad]
     bend: Floats | None = None  # curvature of two blends that meet there, see `BlendJunction`; else None

@@ -31,8 +31,8 @@ from tvist_shaping.named import BUILT_IN, AnyShaper, Registry
 
 SURPLUSES = deque[tuple[ModeSource, AnyShaper | None, str, int, tuple[float, float]]](maxlen=32)
 """Cache of `surplus` for all robots: source of modes, own shaper, name, number of modes, result."""
-POSTURES = 40  # number of postures at which modes are computed for it
-HALF_STEP = 0.03  # half the travel over which their change is measured [rad]
+POSTURES = 40  # number of postures at which modes are computed for `surplus`
+HALF_STEP = 0.03  # half the travel over which the modes' change is measured [rad]
 TIME = 0.01  # time over which the quickest change of modes is measured [s]
 MARGIN = 1.1  # margin for postures not computed [-]
 RISE = 15.0  # ratio of largest D̈ to largest Ḋ, twice that of random streams [1/s]
@@ -45,7 +45,7 @@ ESTIMATORS = ("fixed", "polynomial", "modal")
 class FilterChoice:
     """A filter with its source of modes, feed-forward and friction."""
 
-    source: ModeSource  # source of its modes
+    source: ModeSource  # source of the filter's modes
     tvist: Filter
     elastic: ElasticFeedForward | None  # elastic feed-forward for the drives; None if not used
     law: Floats | None = None  # known friction of the joints, see `known_friction`; None if unknown

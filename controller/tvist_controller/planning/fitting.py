@@ -24,8 +24,8 @@ EASY = MotionLimits(velocity=1.5, acceleration=2.0, jerk=100.0)
 KEEPING_TRIES = 4  # number of trial motions to keep the requested acceleration
 SHARE = 1.0 - 1e-4  # fraction of the limit to aim at; the peak varies slightly with the motion [-]
 TRIES = 10  # number of trial motions before each further one is slower by a fraction that doubles
-HASTE = 0.001  # the first such fraction [-]
-SPLIT = 6  # number of trials that reduce either velocity or acceleration, before both
+HASTE = 0.001  # the first of these fractions [-]
+SPLIT = 6  # number of trials that reduce velocity or acceleration alone; further ones reduce both
 SAMPLES = 64
 """Number of evenly spaced moments checked, in addition to those of the law, if not shaped in advance."""
 BLUNTED = 1.05  # largest ratio of the shaped motion's torque to the unshaped motion's, due to the lag [-]
@@ -62,7 +62,7 @@ class Fitted(NamedTuple):
     """A motion within the limits."""
 
     motion: PlannedMotion
-    slower: Slower = AS_ASKED  # how much slower it is than requested
+    slower: Slower = AS_ASKED  # how much slower the motion is than requested
     limited: Limited | None = None  # limit that slows it down, or that it exceeds; see `PlannedMove.limited`
     q: Floats | None = None  # posture in which the limit applies, shape (n,) [rad]; None without one
 

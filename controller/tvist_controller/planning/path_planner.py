@@ -40,14 +40,14 @@ from tvist_protocol.motions import MoveC, MoveL, MovePath
 from tvist_shaping.base import Filter
 
 POSTURES = 9  # number of postures of a run at which the shaper's delay is computed
-SAMPLES = 1000  # number of places of a run searched for the one hardest for a joint
+SAMPLES = 1000  # number of places of a run searched for the posture in which a limit applies
 SPARED = 0.99
 """Fraction of joint limits that paths use; a shaper with varying weights may exceed its reference a little [-]."""
 LEAST_WINDOW = 0.08
 """Shaper delay for which a path always has room, so that few changes of shaper slow it down [s]."""
 AGILE = MotionLimits(0.25, 1.2, 60.0)
 """Limits of pauses and speed changes for slower motions: the defaults of `move_l`."""
-VARIATION = 1.1  # factor by which the delay may be longer between these postures [-]
+VARIATION = 1.1  # factor by which the shaper's delay may be longer between these `POSTURES` [-]
 
 
 class PathPlanner:

@@ -142,9 +142,9 @@ class CommandRow(NamedTuple):
     changes_io: bool = False  # whether the command may change what `io` reports
     check: Callable[[Any, RobotDescription], None] | None = None
     """Refuses a command that this robot can never carry out; None if the types of the fields suffice."""
-    plan: Planning | None = None  # how it is planned; None if it is quick enough for a tick
+    plan: Planning | None = None  # how the command is planned; None if it needs no plan
     long: bool = False  # whether the message may be longer than `EXPLAINED_BYTES`
-    stops: bool = False  # whether it stops the arm and so must not wait for earlier plans
+    stops: bool = False  # whether the command stops the arm and so must not wait for earlier plans
 
     @property
     def asks(self) -> bool:

@@ -15,7 +15,7 @@ from tvist_protocol.replies import Code
 REACHED = 0.9
 """Fraction of the speed that counts as reached; a peak between two acceleration ramps stays a little lower [-]."""
 BLUNTED = 3.0
-"""The same as a ratio if the way is too short for the speed, since ramps take much of a few millimetres [-]."""
+"""On a way too short for the requested speed: tolerated ratio of its peak without to that with jerk limit [-]."""
 DURATION_TOLERANCE = 1.01  # ratio of durations up to which a motion counts as on time [-]
 USED_UP = 0.95  # fraction of a limit above which it is responsible [-]
 SAMPLES = 65  # number of places of a curve at which the joints' permitted speed is computed

@@ -24,9 +24,9 @@ SAME = 1e-9  # distance below which two knots are one [m]
 class ExtensionEdges:
     """Edges at which a time law is cut for an extension."""
 
-    first: int  # first one kept
-    known: int  # last one up to which the law stays unchanged
-    branch: int  # behind this one the path may change
+    first: int  # first edge that is kept
+    known: int  # edge up to which the law stays unchanged
+    branch: int  # edge behind which the path may change
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,7 @@ class ExtendableMotion:
     law: RetimedLaw
     branches: tuple[Branch, ...]  # points of the curve at which further moves may change it, in order
     segments: int  # number of moves so far
-    window: float  # longest shaper delay it was planned for [s]
+    window: float  # longest shaper delay for which the motion was planned [s]
 
     @property
     def end(self) -> Floats:
@@ -108,5 +108,5 @@ class PlanningState(Struct, frozen=True, eq=False, gc=False):
 FILTER = ("filter",)  # fields that a filter depends on
 MOTION = ("movable", "q", "speed", "slowest", "excess", "surplus", "tcp", "body", "bodies", "filter", "after")
 """Fields that a motion depends on."""
-TOOL = ("tcp",)  # fields that an answer about the tool depends on; its reference may have passed meanwhile
+TOOL = ("tcp",)  # fields that an answer about tool kinematics depends on; the arm may move on meanwhile
 SCRIPT = ("script",)  # fields that a statement for a running program depends on

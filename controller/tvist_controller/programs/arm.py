@@ -46,7 +46,7 @@ class ProgramArm:
         self._guided: int | None = None
         self._abandoned = False
         self._asked = 0  # number of threads waiting to start compliance
-        self._complying: object | None = None  # program that made the arm compliant, until it ends that
+        self._complying: object | None = None  # program that made the arm compliant, until it ends compliance
         self.lead: Callable[[Segment], Turns] | None = None  # makes a move while the arm is compliant
         self.waypoint: Segment | None = None  # target of the present or last move
 

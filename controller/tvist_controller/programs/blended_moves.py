@@ -77,19 +77,19 @@ class BlendedMoves:
         self._effects: list[list[Effect]] = []  # effects of the program after each of these moves
         self.closed = False  # whether no more moves will come
         self.number: int | None = None  # number of the motion while it runs
-        self.outcome: str | None = None  # event that ended it
+        self.outcome: str | None = None  # event that ended the motion
         self._stops_at: tuple[int, float] | None = None
-        """Progress at the end of its protective stop, see `stop`; None without one."""
+        """Progress at the end of the motion's protective stop, see `stop`; None without one."""
         self.skipped = False  # whether `abort` was called; a motion then being planned is not started
-        self.over = False  # whether it is complete
-        self.fault: Exception | None = None  # error that its thread raises
+        self.over = False  # whether all moves are complete
+        self.fault: Exception | None = None  # error that the thread of these moves will raise
         self._steps: Turns | None = None
         self._marks: list[tuple[int, float]] = []
         """Where the blend at the end of each present move begins, see `PlannedMove.marks`."""
         self._extension: tuple[Callable[[], Plan], int, int] | None = None
         """Ordered plan of an extension, tick at which it applies, and number of moves."""
         self._final = self._refuses = False
-        """Whether the running motion cannot be extended, and whether because a further move is impossible."""
+        """Whether the running motion cannot be extended; whether the reason is that a further move is impossible."""
         self._count = 0  # number of moves of the running motion
 
     # ------------------------------------------------------------------ for the program

@@ -108,7 +108,7 @@ class StatementQueue:
         yield from machine.add(script, f"statement {self._executed}")
         if self._clearing:
             self._forget(machine, script.scope.number)
-            if CLEAR not in script.used:  # otherwise this was done when it was added
+            if CLEAR not in script.used:  # otherwise this was done when the statement was added
                 self._restart(machine)
         if machine.left <= 0:
             yield

@@ -113,7 +113,7 @@ class _Socket:
     number: int
     received: bytearray = field(default_factory=bytearray)
     connected: bool | None = None  # true after opening, False after failing, None in between
-    open: bool = False  # whether it is connected
+    open: bool = False  # whether the socket is connected
     requests: Requests | None = None  # parser of requests to the cell's gripper; None for a network socket
 
     def shut(self) -> None:

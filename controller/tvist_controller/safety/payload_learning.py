@@ -30,7 +30,7 @@ from tvist_protocol.values import Payload
 
 LONGEST = 10_000  # longest recorded motion; longer ones are dropped [ticks]
 AFTER = 150  # recording time after the end of a motion, for the ring-down [ticks]
-WAITING = 16  # largest number of waiting studies; further motions teach nothing
+WAITING = 16  # largest number of waiting studies; further motions are not studied
 BLOCK = 10  # ticks averaged per block
 MIN_BLOCKS = 20  # smallest number of blocks of a motion
 UNKNOWN = {  # prior deviations per joint [-]
@@ -52,7 +52,7 @@ DRIFT = (0.2, 0.01)  # deviation due to changes since the last motion: mass [kg]
 LIGHT = 0.25  # mass below which the centre of mass is not estimated [kg]
 DEAD = 0.25  # smallest change of mass that is reported [kg]
 SURE_DEVIATIONS = 2.0  # number of standard deviations for a certain change [-]
-VAGUE = 0.35  # deviation of the mass above which a motion teaches nothing [kg]
+VAGUE = 0.35  # standard deviation of the mass above which a motion's estimate is not used [kg]
 PUSHED = 3.0  # mean squared residual relative to noise above which something else pushed the arm [-]
 
 
@@ -69,9 +69,9 @@ class MotionRecord:
 
 @dataclass
 class _Motion:
-    beliefs: FilterState  # assumed at its start
+    beliefs: FilterState  # state assumed by the controller at the motion's start
     samples: list[Sample] = field(default_factory=list)
-    stop: int = 0  # as in `MotionRecord`; 0 while it moves
+    stop: int = 0  # as in `MotionRecord`; 0 while the arm moves
     whole: bool = True
 
     def record(self) -> MotionRecord:

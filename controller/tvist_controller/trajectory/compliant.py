@@ -14,10 +14,10 @@ from tvist_controller.trajectory.limiter import TorqueMargin
 from tvist_controller.trajectory.speed import abrupt
 from tvist_plant.plant import PERIOD
 
-NEWTON = 3  # newton steps from tool pose to joint angles; two suffice for the travel of a tick
+NEWTON = 3  # Newton steps from tool pose to joint angles; two suffice for the travel of a tick
 OFF = 1e-5  # pose error in a stiff direction above which the motion cannot continue [m or rad]
 FASTEST = 0.5  # fraction of joint velocity available to compliance [-]
-CRAWL = 0.05  # fraction of it below which a singular posture counts as hindering compliance [-]
+CRAWL = 0.05  # fraction of the force law's velocity below which a singular posture nearly blocks the arm [-]
 LEVER = 0.22  # length equivalent to a turn by 1 rad; its square scales virtual inertias and dampings [m]
 MASS = 70.0  # virtual mass M [kg]; the time constant M/D keeps the arm's elasticity out of the loop
 FREE_DAMPING = 2000.0  # damping in free space at damping parameter 1 [N s/m]
@@ -70,7 +70,7 @@ class Compliant(LimitedFollower):
     postures prevent a compliant motion, it is removed from P, so that nothing is caught up later.
     """
 
-    finished = False  # it ends by a command
+    finished = False  # a compliant motion ends by a command
 
     def __init__(
         self,

@@ -113,15 +113,15 @@ class Limiter:
         self._reach = np.array(reach, dtype=float)
         self._torque = torque
         self.q = np.array(q, dtype=float)  # position of the reference, shape (n,) [rad]
-        # Velocity of the signal; differences of the reference, and its second difference a tick earlier.
+        # Velocity of the signal; second difference of the reference a tick earlier; present differences.
         self._signal_qd, self._bend_before, self._now = qd, PERIOD * PERIOD * qdd, np.zeros((DIFFERENCES, n))
         self._now[STEP], self._now[BEND] = PERIOD * (qd - 0.5 * PERIOD * qdd), self._bend_before
         self._state: Floats | None = np.stack(
             state
-        )  # derivatives, if they differ from those of the differences
+        )  # position and derivatives of the reference, if these differ from its differences
         self._behind: Bools | None = None  # which joints are not on the signal, if any
         self.behind = 0.0  # lag of joints that cannot catch up with a signal at its limits [s]
-        # Within this position, no state within the limits needs a check of the range.
+        # At positions smaller than this, no state within the limits needs a check of the range.
         slow = limits.acceleration if torque is None else min(limits.acceleration, HEAVY)
         ramp, swing = limits.acceleration / limits.jerk, limits.velocity / slow
         lasting = max(swing + ramp, 2.0 * math.sqrt(limits.velocity / limits.jerk))
@@ -272,7 +272,7 @@ class Limiter:
         request.max_acceleration = (limit - qdd).tolist()
         request.min_acceleration = (-limit - qdd).tolist()
         relative = _after_a_tick(self._catcher, request)
-        if relative is None:  # it would take more than 7600 s
+        if relative is None:  # catching up would take more than 7600 s
             return self._change_to(np.zeros_like(q), limit)
         return np.stack((q, qd, qdd)) + relative
 

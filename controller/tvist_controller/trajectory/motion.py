@@ -114,11 +114,11 @@ class DoubleS:
                 f"velocity {limits.velocity:g}, acceleration {limits.acceleration:g}, jerk {limits.jerk:g}"
             ) from error
         self.limits = limits
-        self.begins = 0.0  # time from which it is known [s]
+        self.begins = 0.0  # time from which the law is known [s]
         self.duration = float(self._trajectory.duration)  # duration from rest to rest [s]
         # Motion from rest to rest is symmetric in time.
         leading = self._trajectory.profiles[0][int(np.argmax(np.abs(end - start)))]
-        self.brakes_at = self.duration - sum(leading.t[:3])  # time at which it starts braking [s]
+        self.brakes_at = self.duration - sum(leading.t[:3])  # time at which the motion starts braking [s]
         self.moments: Floats = np.cumsum(leading.t)
         """Times at which the jerk changes, with possibly largest velocity or acceleration [s]."""
 
@@ -244,7 +244,7 @@ class PlannedMotion(Trajectory):
         longer = self.velocity * (1.0 / acceleration - 1.0 / most) + 2.0 * most / self.limits.jerk
         hardest = self.agility.acceleration <= most
         if forecast.steady == 0.0 and self.rate == 1.0 and self.steady and hardest:
-            return False  # it brakes as hard as it can
+            return False  # the motion already brakes as hard as it can
         if forecast.steady < longer + SURELY and not _stands_sooner(paused, self.fork()):
             return False
         self.speed, self._pace.acceleration = 0.0, acceleration

@@ -13,7 +13,7 @@ SPARE_PERIODS = 1  # additional delay of a stream slower than the tick, for jitt
 SLACK = 0.3  # tolerated excess delay, which avoids constant changes [periods]
 SHARE = 0.05  # fraction of the limits available to a change of delay [-]
 CALM = 0.5  # time after which a delay required by the limits is reduced if no longer needed [s]
-SLOW_SHARE = 0.05  # fraction of the velocity limit below which the stream must be for that [-]
+SLOW_SHARE = 0.05  # fraction of the velocity limit below which the delay may be reduced [-]
 CLOSE = 1e-6  # difference below which the delay equals its target [ticks]
 
 

@@ -23,7 +23,7 @@ MIN_DIVISOR = 1e-9  # smallest divisor
 ROUNDS = 3  # rounds of applying windowed limits to a motion, an odd number
 ROUNDING = 1e-9  # relative excess of a limit that counts as rounding [-]
 AT_REST: Floats = np.zeros(1)  # known ṡ² of a motion from rest
-SHORTLY = 1e-9  # time offset from a change of acceleration at which it is evaluated [s]
+SHORTLY = 1e-9  # time offset from a change of acceleration, to evaluate the acceleration beside the step [s]
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ def flatten_peaks(edges: Floats, b: Floats, ramp: float, known: int) -> Floats: 
     for top in range(known + 1, last):
         if out[top] < out[top - 1] or out[top] <= out[top + 1]:
             continue
-        low, high = top - 1, top + 1  # the last of the highest edges, which need not be one
+        low, high = top - 1, top + 1  # `top` is the last of the highest edges, of which there may be several
         most = max(out[low], out[high])
         while most > 0.0 and edges[high] - edges[low] < np.sqrt(most) * ramp:
             if low > known and (out[low] >= out[high] or high == last):
@@ -124,7 +124,7 @@ def flatten_peaks(edges: Floats, b: Floats, ramp: float, known: int) -> Floats: 
                 high += 1
             else:
                 break
-            if max(out[low], out[high]) <= 0.0:  # no longer than a ramp
+            if max(out[low], out[high]) <= 0.0:  # the whole motion is no longer than a ramp
                 break
             most = max(out[low], out[high])
         for number in range(low + 1, high):
@@ -160,9 +160,9 @@ class RetimedLaw:
         self._rows = list(zip(self._begun.tolist(), *self._pieces.tolist(), strict=True))
         self._starts = self._times.tolist()
         self.duration = float(times[-1] + ramp) / rate  # duration from rest to rest [s]
-        self.begins = 0.0 if b[0] == 0.0 else (start + ramp) / rate  # time from which it is known [s]
+        self.begins = 0.0 if b[0] == 0.0 else (start + ramp) / rate  # time from which the law is known [s]
         braking = int(np.flatnonzero(accelerations < 0.0)[0])
-        self.brakes_at = float(times[braking]) / rate  # time at which it starts braking [s]
+        self.brakes_at = float(times[braking]) / rate  # time at which the motion starts braking [s]
         changes = np.concatenate((times + SHORTLY, times + ramp - SHORTLY))
         changes = changes if b[0] == 0.0 else changes[changes >= start + ramp]
         jerk = (

@@ -21,7 +21,7 @@ BENT_SHARE = 0.5
 """Fraction of joint acceleration available to the curvature of the joints' path at constant speed [-]."""
 MORE = 1e-6  # relative excess of a limit that counts as rounding [-]
 LOOK = 5.0  # ticks ahead over which the curvature is measured
-FARTHEST_LOOK = 0.05  # largest joint angle over which it is measured [rad]
+FARTHEST_LOOK = 0.05  # largest joint angle over which the curvature is measured [rad]
 SLOWEST = 0.01  # fraction of the commanded speed below which the tool is stuck [-]
 CORRECTIONS = 4  # largest number of Newton steps
 OFF = 1e-7  # permitted error of the tool's pose [m or rad]
@@ -165,7 +165,7 @@ class Speed(Guided):
         limits: MotionLimits,  # of every joint; the jerk is that of stops
         torque: TorqueMargin,
         *,
-        rate: float = 1.0,  # of its time, 0 to 1 [-]; more if the joints are too fast for it at the start
+        rate: float = 1.0,  # time rate, 0 to 1 [-]; more if the joints are too fast for this rate at the start
         arm: Arm | None = None,  # the arm whose tool has the velocity; None for velocities of the joints
     ) -> None:
         self._q, self._qd, self._qdd = (np.array(values, dtype=float) for values in state)

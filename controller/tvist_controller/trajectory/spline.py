@@ -120,7 +120,7 @@ class SplineCurve(Path):
 
     def become(self, other: "SplineCurve") -> None:
         """Continue as another curve that is equal between the present point and this one's end."""
-        posture_of = self.posture_of  # captured by what is shaped on this curve
+        posture_of = self.posture_of  # filter and shaped reference hold this function, bound to this object
         self.__dict__.update(other.__dict__)
         self.posture_of = posture_of
         self._one = np.empty_like(self._one)

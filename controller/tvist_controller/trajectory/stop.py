@@ -98,11 +98,11 @@ class PathStop(Slowing):
         self,
         path: Path,
         x: Floats,  # newest sample, shape (m,) [rad]
-        step: Floats,  # from the sample before, along the path's direction, shape (m,) [rad]
-        xdd: Floats,  # second difference of the last three, likewise, shape (m,) [rad/s^2]
+        step: Floats,  # step from the previous sample to x, along the path's direction, shape (m,) [rad]
+        xdd: Floats,  # acceleration from the last three samples, along the path's direction, shape (m,) [rad/s^2]
         *,
         acceleration: float,  # limit for the joints [rad/s^2]
-        braking: float,  # corresponding one for the parameter [rad/s^2]
+        braking: float,  # corresponding limit for the parameter [rad/s^2]
         jerk: float,  # limit for the parameter [rad/s^3]
     ) -> None:
         before, period = path.forwards(xdd), PERIOD

@@ -28,7 +28,7 @@ class SetpointStream(LimitedFollower):
     the sender runs ahead, play-out continues with the newest. The result passes the `Limiter`.
     """
 
-    finished = False  # it is ended from outside
+    finished = False  # a stream is ended from outside
     MAX_WAITING = 1000  # largest number of set-points waiting for play-out
 
     def __init__(
@@ -116,7 +116,7 @@ class SetpointStream(LimitedFollower):
         self._heard.clear()
         if min(self._waiting) <= self._head:
             for sequence in sorted(number for number in self._waiting if number <= self._head):
-                # It was replaced meanwhile, but later replacements should take it into account.
+                # This set-point came too late and was replaced, but later replacements should take it into account.
                 self._keep(sequence, self._waiting.pop(sequence))
                 self.late += 1
 

@@ -66,7 +66,7 @@ def add_pairs(spec: "mujoco.MjSpec", model: "mujoco.MjModel", arm: Names) -> Con
                 f"more than {MOST_PAIRS} pairs of shapes may touch, too many for real time; "
                 'give what is only seen contype="0" conaffinity="0"'
             )
-    for one in spec.geoms:  # only the pairs touch
+    for one in spec.geoms:  # only shapes of the added pairs touch
         one.contype = one.conaffinity = 0
     return given
 
@@ -79,7 +79,7 @@ def set_contacts(model: "mujoco.MjModel", given: Contacts) -> None:
         if model.pair_solimp[number][0] != IMPEDANCE:
             continue  # keep the scene's own pairs
         if (inverse := _inverse_mass(model, number)) == 0.0:
-            continue  # both are immovable
+            continue  # both shapes are immovable
         k = STIFFNESS if stiffness is None else stiffness
         c = 2.0 * DAMPING_RATIO * np.sqrt(k / inverse) if damping is None else damping
         kinds = {int(model.geom_type[geom]) for geom in (model.pair_geom1[number], model.pair_geom2[number])}

@@ -178,7 +178,7 @@ class MujocoArm(SimulatedArm):
     def _wrench(self) -> Floats:
         """Return the wrench that everything beyond the flange exerts on it, in its frame, shape (6,) [N, N m]."""
         data, load = self._data, self._load
-        whole = data.cfrc_int[load]  # of the flange, about the centre of mass of the arm
+        whole = data.cfrc_int[load]  # wrench of the flange on the load, about the centre of mass of the arm
         x, y, z = (data.subtree_com[self._model.body_rootid[load]] - self._place).tolist()
         fx, fy, fz = whole[3:].tolist()
         moment = whole[:3] + np.array([y * fz - z * fy, z * fx - x * fz, x * fy - y * fx])
@@ -233,7 +233,7 @@ class MujocoArm(SimulatedArm):
         """Return what the arm would overlap after a reset, None if nothing."""
         model = copy(self._model)
         if payload is not None:
-            carry(model, payload)  # it bends the arm
+            carry(model, payload)  # the payload's weight bends the arm
         data = mujoco.MjData(model)
         settle(self._description, model, data, q)
         return self._met(data)

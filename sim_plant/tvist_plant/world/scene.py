@@ -31,7 +31,7 @@ _KINDS = {
 class World:
     """An arm, alone or in a scene."""
 
-    model: "mujoco.MjModel"  # model of both, the arm first
+    model: "mujoco.MjModel"  # model of arm and scene, the arm first
     contacts: Contacts = ()  # result of `add_pairs`, for `set_contacts`
     things: Things | None = None  # the objects besides the arm
     bodies: tuple[int, ...] = ()  # numbers of the bodies of `things`
