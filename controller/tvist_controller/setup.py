@@ -1,4 +1,4 @@
-"""Initial setup of a controller: everything besides clients' messages that determines its behaviour."""
+"""Initial setup of a controller: with the clients' messages, this determines all of its behaviour."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

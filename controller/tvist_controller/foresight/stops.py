@@ -226,13 +226,13 @@ class StopPlanner:
         return _first(filter(permitted, stops), lambda stop, rebound: torque.holds(stop, rebound=rebound))
 
     def _keeping(self, state: Target, forecast: BrakingForecast, acceleration: float) -> MotionLimits | None:
-        """Return limits of a stop's parameter that keep all joints within an acceleration and the stops' jerk."""
+        """Return limits of the path's parameter with which a stop keeps every joint's acceleration and jerk limit."""
         speed, rise = abs(forecast.path.forwards(state.qd)), abs(forecast.path.forwards(state.qdd))
         fastest = speed + PERIOD * rise + rise * rise / self.jerk
         return forecast.path.keeping(MotionLimits(fastest, acceleration, self.jerk), fastest, state.q)
 
     def _ladder(self, wanted: float | None) -> Iterator[float]:
-        """Yield trial decelerations: down from the requested one, then up from it."""
+        """Yield trial decelerations: from the requested one down to the gentlest, then those above the requested one."""
         first = self.highest if wanted is None else min(max(wanted, GENTLEST_STOP), self.highest)
         down = first
         while down > GENTLEST_STOP:

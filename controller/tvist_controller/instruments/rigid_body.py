@@ -44,7 +44,7 @@ def momentum_of(chain: Floats, q: Floats, qd: Floats, bodies: Floats) -> tuple[f
 
 
 class RigidBody:
-    """The arm as the controller models it.
+    """The rigid arm with the declared payload, as the controller models them.
 
     Motions are joint positions [rad], velocities [rad/s] and accelerations [rad/s²], shape (3, n). Offsets
     are the tool centre point in the flange frame: x y z [m] and rotation vector [rad].

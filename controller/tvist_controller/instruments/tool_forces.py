@@ -23,7 +23,7 @@ from tvist_protocol.values import Payload
 
 
 class ToolForces:
-    """External forces, measured by the flange sensor if there is one, else estimated from drive torques."""
+    """External forces: measured by a force sensor at the flange if there is one, else estimated from drive torques."""
 
     def __init__(
         self,

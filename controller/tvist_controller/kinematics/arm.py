@@ -37,8 +37,8 @@ def end_motion(chain: Floats, q: Floats, qd: Floats, out: Floats) -> None:
 def end_acceleration(chain: Floats, q: Floats, qd: Floats, qdd: Floats, out: Floats) -> None:
     """Compute the end's linear and angular acceleration, J q̈ + J̇ q̇, shape (6,) [m/s^2, rad/s^2].
 
-    With the parts ω and v of the Jacobian's columns, joint k moves column j by ω_min(j,k) x v_max(j,k), and
-    its ω_j by ω_k x ω_j if k < j.
+    Columns of the Jacobian have parts v and ω. At unit velocity, joint k changes v_j at the rate ω_min(j,k) x
+    v_max(j,k) and, if k < j, ω_j at the rate ω_k x ω_j.
     """
     R, o, J = np.empty((3, 3)), np.empty(3), np.empty((6, q.shape[0]))
     locate(chain, q, R, o, J)
@@ -137,7 +137,7 @@ class Arm:
     def near(
         self, goal: tuple[Floats, Floats], q: Floats, inverse: Floats | None = None, steps: int = 12
     ) -> tuple[Floats, Floats]:
-        """Return joint positions near q at a tool pose, and the remaining error; `inverse` as in `newton`."""
+        """Return joint positions near q for a tool pose, and the remaining error; for `inverse` see `newton`."""
         rotation, position = map(
             np.ascontiguousarray, goal
         )  # same memory layout, so that the kernel is compiled only once
@@ -183,8 +183,8 @@ class InverseDynamics(Arm):
     """The arm with its declared payload.
 
     Torque is linear in a body's ten inertial parameters (mass, first moment, inertia about the joint), so a
-    new payload is phased in by a ramp between two sets of them. The torque then has no step, and all sets in
-    between are physically possible, since such bodies form a convex set (Wensing, Kim and Slotine, 2018).
+    new payload is phased in by a ramp between two sets of parameters. The torque then has no step, and all sets in
+    between are physically possible, since possible parameters form a convex set (Wensing, Kim and Slotine, 2018).
     """
 
     def __init__(self, description: RobotDescription, payload: Payload) -> None:

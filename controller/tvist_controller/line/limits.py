@@ -92,7 +92,7 @@ class StreamTorqueMargin:
     def acceleration(self, q: Floats, qd: Floats) -> float:
         """Return the largest a such that every |q̈ᵢ| ≤ a is allowed, at least `GENTLEST_STOP` [rad/s^2].
 
-        With τ = M q̈ + h, such a q̈ needs at most |hᵢ| + a Σⱼ|Mᵢⱼ| at joint i.
+        With τ = M q̈ + h, any q̈ with |q̈ᵢ| ≤ a needs at most the torque |hᵢ| + a Σⱼ|Mᵢⱼ| at joint i.
         """
         room = self._room(q, qd, self._most, 1.0)
         if self._rebound > 0.0:
@@ -171,8 +171,8 @@ def acceleration_on_way(
 ) -> float:
     """Return the largest acceleration of a path's parameter that keeps torques within their share [rad/s^2].
 
-    Along q(x) the torque is m(x) ẍ + c(x) ẋ² + g(x), largest at a corner of the range of ẋ² and ẍ. It is
-    checked at 17 points of a way from `start`, both of shape (m,); `limits` are the joints' torque limits.
+    Along q(x) the torque is m(x) ẍ + c(x) ẋ² + g(x), which is largest at a corner of the range of ẋ² and ẍ. This
+    is checked at 17 points of `way` from `start`, both of shape (m,); `limits` are the joints' torque limits.
     """
     farthest, x = float(np.abs(way).max()), start + _POINTS * way
     still = np.zeros_like(x)
@@ -184,7 +184,7 @@ def acceleration_on_way(
 
 
 def torque_along(dynamics: InverseDynamics, references: Floats) -> Floats:
-    """Return the largest torques along references (k >= 3, n) [rad] by central differences, (n,) [N m]."""
+    """Return each joint's largest torque along references (k >= 3, n) [rad], by central differences, (n,) [N m]."""
     q, qd, qdd = central_differences(references)
     looked = np.append(np.arange(0, len(q) - 1, LOOK_EVERY), len(q) - 1)
     states = zip(q[looked], qd[looked], qdd[looked], strict=True)

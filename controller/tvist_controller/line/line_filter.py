@@ -46,7 +46,7 @@ class LineFilter:
         return self.tvist.peak if fade is None else max(self.tvist.peak, fade.old.peak, fade.new.peak)
 
     def reduced_limits(self, limits: MotionLimits | None = None) -> MotionLimits:
-        """Return limits of a reference such that the shaped one keeps the arm's limits and the given ones."""
+        """Return limits for the reference with which the shaped reference keeps the arm's limits and the given ones."""
         arm, (faster, harder) = self._arm, (1.0 + more for more in self.tvist.surplus)
         limits = arm if limits is None else limits
         return MotionLimits(
@@ -56,7 +56,7 @@ class LineFilter:
         )
 
     def filter(self, reference: Floats) -> Floats:
-        """Return the shaped sample; during a transition, that of both filters."""
+        """Return the shaped sample; during a transition, a mixture of both filters' outputs."""
         if (fade := self._fade) is None:
             return self.tvist.filter(reference)
         shaped = fade.filter(reference)

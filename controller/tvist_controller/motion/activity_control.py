@@ -239,7 +239,7 @@ class MotionControl:
         kind: EventKind | None = None,
         category: int = 2,
     ) -> None:
-        """Report a stop and the motion that it ended; `plan` is None if the line is already stopping."""
+        """Report a stop and the motion that it ends; `plan` is None if the line is at rest or already stopping."""
         if kind is None and not self.motions.running and not self.streaming:
             return
         duration, way = (0.0, 0.0) if self.cycle.mode.at_rest else self.ahead.until_rest(plan)
@@ -260,7 +260,7 @@ class MotionControl:
             self.interrupt(silence)
 
     def step(self, wrench: Floats | None = None) -> Sample:
-        """Compute one tick of the line; see `ControlCycle.step`. After a PlantError, call `recover`."""
+        """Compute one tick of the line; see `ControlCycle.step`. After a PlantError, call `SafetyControl.recover`."""
         if self.power is not None:
             self.power.follow(self.robot_mode)
         sample = self.cycle.step(wrench)

@@ -143,8 +143,8 @@ class ForceControl(Monitor):
     def begin(self, task: ForceTask, feature: Feature, kind: int, trigger: str = "force_mode") -> int:
         """Start or change force control with trigger `force_mode` or `freedrive`; return the motion's number.
 
-        A running guided motion continues in the other axes. `feature` is the task's frame, `kind` 1 to 3 as
-        in `frame_of`. Raise RefusalError if the activity or its motion does not allow it.
+        A running guided motion continues in the other axes. `feature` is the task's frame; `kind`, 1 to 3, is
+        explained in `frame_of`. Raise RefusalError if the present activity or motion does not allow force control.
         """
         if self._cycle.plant.supervised:
             raise wrong_mode(
@@ -166,7 +166,7 @@ class ForceControl(Monitor):
         return self.begin(task, feature, 2, "freedrive")
 
     def end(self) -> None:
-        """End force mode, if on, and any motion in the other axes; come to rest."""
+        """End force mode and the motion in the other axes, if any; the arm comes to rest."""
         if self._guidance.compliant is not None:
             self._guidance.stop_joints(GENTLE, "end_force_mode")
 

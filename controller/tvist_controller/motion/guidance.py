@@ -44,7 +44,7 @@ class Guidance:
         arm.near((turned(rotation, turn(rotation, rotation)), position), q)
 
     def servo(self, q: Floats, lookahead: float, gain: float, *, shaped: bool) -> int:
-        """Follow a posture, see `ServoFollower`, and return the motion's number; RefusalError as in `check`."""
+        """Follow a posture, see `ServoFollower`; return the motion's number. Raise RefusalError as `check` does."""
         self.check("servo_j", shaped=shaped)
         servo = self._present(ServoFollower, shaped) or ServoFollower(
             self._start(shaped), self._most(shaped), self.reach, self.torque
@@ -53,7 +53,7 @@ class Guidance:
         return self.follow("servo_j", servo, shaped=shaped)
 
     def move_joints(self, qd: Floats, acceleration: float, *, shaped: bool) -> int:
-        """Approach joint velocities, see `Speed`; return the motion's number. RefusalError as in `check`."""
+        """Approach joint velocities, see `Speed`; return the motion's number. Raise RefusalError as `check` does."""
         self.check("speed_j", shaped=shaped)
         if shaped:
             most = self._most(shaped).velocity
@@ -63,7 +63,7 @@ class Guidance:
     def move_tool(
         self, twist: Floats, acceleration: float, angular_acceleration: float, *, shaped: bool
     ) -> int:
-        """Approach a tool velocity, see `Speed`; return the motion's number. RefusalError as in `check`."""
+        """Approach a tool velocity, see `Speed`; return the motion's number. Raise RefusalError as `check` does."""
         self.check("speed_l", shaped=shaped)
         accelerations = (acceleration, angular_acceleration)
         return self._approach("speed_l", self.motion.tool, twist, accelerations, shaped=shaped)
@@ -129,7 +129,7 @@ class Guidance:
 
     @property
     def compliant(self) -> Compliant | None:
-        """The present force-compliant motion; None without one."""
+        """The present motion with compliance (force mode or freedrive); None without one."""
         present = self._cycle.trajectory
         guided = self.motion.activity is Activity.GUIDED
         return present if guided and isinstance(present, Compliant) else None

@@ -56,7 +56,7 @@ class MovePlanner(Fitter):
         self._collisions = CollisionModel(setup.description, body(setup.payload))
 
     def move(self, command: MoveJ, now: PlanningState, *, at_once: bool = False) -> PlannedMove:
-        """Plan a motion from rest, or raise RefusalError; `at_once` omits shaping in advance to save time."""
+        """Plan a motion from rest, or raise RefusalError; with `at_once`, save time by not shaping it in advance."""
         path, duration = JointLine(now.q, np.array(command.q, dtype=float)), command.duration
         limits, agility = MotionLimits(command.velocity, command.acceleration, command.jerk), None
         if duration is not None:

@@ -20,10 +20,10 @@ WAITS, CLEAR = "interpreter_mode", "clear_interpreter"
 
 
 class StatementQueue:
-    """The statements for one robot's program.
+    """The statements that clients have added to one robot's program.
 
-    A program that calls `interpreter_mode` anywhere accepts statements from its start; they run while it
-    waits in that function.
+    If a program calls `interpreter_mode` anywhere, it accepts statements from its start on; these run while the
+    program waits in that function.
     """
 
     def __init__(
@@ -40,7 +40,7 @@ class StatementQueue:
 
     @property
     def published(self) -> Interpreter | None:
-        """State of the statements; None before the first program that accepts some."""
+        """State of the statements for `io`; None before the first program that accepts statements."""
         if not self._published:
             return None
         return Interpreter(

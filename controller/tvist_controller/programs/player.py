@@ -35,8 +35,8 @@ class _Running:
 class ProgramPlayer:
     """Runs a program and secondary ones with the rights of the client that played them.
 
-    Their motions are ordinary ones with numbers and events. A client may pause them; stopping one ends the
-    program. A protective stop pauses the program; after unlocking, playing resumes with the interrupted move.
+    Motions of programs have numbers and events like those of clients. A client may pause a motion; stopping it ends
+    the program. A protective stop pauses the program; after unlocking, playing resumes with the interrupted move.
     """
 
     def __init__(self, access: Access, safety: SafetyControl) -> None:

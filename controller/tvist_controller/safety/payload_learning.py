@@ -84,7 +84,7 @@ class _Motion:
 Later = Callable[[Callable[[], None]], Callable[[], bool]]
 """Starts a study outside the ticks; returns a function that tells whether it has ended."""
 Study = Callable[[MotionRecord], PayloadLesson | None]
-"""Returns what a motion teaches, None for nothing; called by one thread at a time. All results are in the
+"""Returns the lesson of a motion, None without one; called by one thread at a time. The journal contains all
 lessons, so a replay studies nothing."""
 Plans = Callable[[PayloadLesson, FilterState], Plan]  # plans the change that a lesson requires
 

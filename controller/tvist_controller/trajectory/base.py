@@ -39,7 +39,7 @@ class CheckedMotion(NamedTuple):
 class Path(ABC):
     """Joint positions q(x) as a function of a parameter x.
 
-    Time laws, the TVIST filter and stops act on the parameter, so results stay on any path. The parameter has
+    Time laws, the TVIST filter and stops act on the parameter, so their results stay on the path. The parameter has
     shape (m,) and goes straight from `start` to `end`, in radians for a straight line in joint space, in
     metres for a tool path.
     """

@@ -93,8 +93,8 @@ class DoubleS:
     """Time-optimal motion from rest to rest within limits, shape (m,) [rad], all entries in phase.
 
     The entry with the longest distance determines the duration (Biagiotti and Melchiorri 2008, ch. 3.4). With
-    the paper's 1.5 rad/s, 2.0 rad/s² and 100 rad/s³, acceleration ramps last 20 ms. Raise ValueError if it
-    would last for hours.
+    the paper's 1.5 rad/s, 2.0 rad/s² and 100 rad/s³, acceleration ramps last 20 ms. Raise ValueError if the
+    motion would last for hours.
     """
 
     def __init__(self, start: Floats, end: Floats, limits: MotionLimits) -> None:
@@ -282,7 +282,7 @@ def quickest_motion(
 ) -> PlannedMotion:
     """Return the double-S motion along a path from rest to rest within limits of its parameter.
 
-    Speed and agility are those of `PlannedMotion`. Raise ValueError if it would last for hours.
+    For `speed` and `agility` see `PlannedMotion`. Raise ValueError if the motion would last for hours.
     """
     return PlannedMotion(path, DoubleS(path.start, path.end, limits), speed, agility)
 

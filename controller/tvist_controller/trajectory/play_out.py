@@ -20,11 +20,11 @@ CLOSE = 1e-6  # difference below which the delay equals its target [ticks]
 class PlayOut:
     """Position of a stream to play at each tick, in sequence numbers.
 
-    The sender's clock may differ, and transport delay varies. The lateness of set-point k is the tick before which it
-    arrived minus k periods. Play-out waits for the latest of recent set-points, but not much longer than the earliest
-    needs. So it compensates jitter, follows a slow or fast clock, and does not wait for gaps. The delay D approaches
+    The sender's clock may differ, and transport delay varies. If set-point k arrives before tick i, its lateness is i
+    minus k periods. The play-out delay D suits the latest of recent set-points, but is not much longer than the
+    earliest needs. So play-out compensates jitter, follows a slow or fast clock, and does not wait for gaps. D follows
     its target through three first-order lags, without overshoot. With stream velocity q', q̈ contains -q' D̈; the lags'
-    time constant, zero at rest, limits this term and its jerk to a fraction of the limits.
+    time constant, zero at rest, keeps this term and its jerk within a fraction of the limits.
     """
 
     def __init__(

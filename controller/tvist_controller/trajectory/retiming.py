@@ -2,7 +2,7 @@
 
 In the phase plane of s and b = ṡ², constant acceleration is a straight line, db/ds = 2 s̈. A backward and a forward
 pass through the curve's cells find the largest permitted b (Bobrow, Dubowsky and Gibson 1985, with bounds independent
-of the sign of s̈). Its acceleration has steps; the moving mean of s(t) over `ramp` seconds has none, and bounded jerk.
+of the sign of s̈). This motion's acceleration has steps; the moving mean of s(t) over `ramp` seconds has bounded jerk.
 
 This mean, and any shaper behind it, mixes moments of the motion and so passes a place at speeds of its neighbourhood.
 Joint limits in a cell therefore hold for all cells passed within a time window.

@@ -20,12 +20,12 @@ BRIDGED = 2  # largest number of consecutive missing set-points that are extrapo
 class SetpointStream(LimitedFollower):
     """A reference generated from a client's set-points.
 
-    At the controller's rate, set-points pass unchanged. Slower ones are control points of a cubic B-spline,
-    which keeps the limits that they keep. The spline needs two periods and a third is for jitter, so the
-    reference is late by three periods minus a tick, or more if set-points come later or by another clock
-    (`PlayOut`). A set-point missing when due is replaced by a point on the parabola through its neighbours.
-    If none arrive, the reference comes to rest within limits until the stream continues. After a gap, or if
-    the sender runs ahead, play-out continues with the newest. The result passes the `Limiter`.
+    Set-points at the controller's rate pass unchanged. Set-points at a lower rate are control points of a cubic
+    B-spline, which keeps their limits. The spline needs two periods and jitter a third, so the reference is late
+    by three periods minus a tick, or more if set-points come later or by another clock (`PlayOut`). If a
+    set-point is missing when due, a point on the parabola through its neighbours replaces it. If no set-points
+    arrive, the reference comes to rest within limits until the stream continues. After a gap, or if the sender
+    runs ahead, play-out continues with the newest set-point. The result passes the `Limiter`.
     """
 
     finished = False  # a stream is ended from outside
@@ -201,9 +201,9 @@ def linear(
 def cubic(points: Sequence[Floats], u: float, rate: float) -> tuple[Floats, Floats, float]:
     """Evaluate the uniform cubic B-spline between the middle two of four points; see `linear`.
 
-    Its second derivative varies linearly between the points' second differences and its third is their third
-    difference, so it keeps the points' limits of velocity, acceleration and jerk. It passes the points at a
-    distance of q''/6 on the inside of the bend (de Boor 1978, ch. IX to XI).
+    The spline's second derivative varies linearly between the points' second differences, and its third derivative
+    is their third difference, so the spline keeps the points' limits of velocity, acceleration and jerk. It passes
+    the points at a distance of q''/6 on the inside of the bend (de Boor 1978, ch. IX to XI).
     """
     v = 1.0 - u
     found = np.empty((2, len(points[0])))
