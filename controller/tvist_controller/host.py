@@ -36,7 +36,7 @@ class Host:
         controller: The robot.
         sinks: Sinks of its output, in this order.
         ports: Network for sockets of programs; None for no network.
-        learning: What the robot learns from its motions; None for nothing.
+        learning: Learning from the robot's motions; None if the robot learns nothing.
         survives: If True, an exception causes a protective stop and goes to the sinks, not to the caller.
     """
 

@@ -22,7 +22,7 @@ class LoopbackHost(Sink):
     Args:
         setup: Initial setup with the clock `free` or `lockstep`.
         plant: Plant to control; None for the setup's flexible arm.
-        learning: What the robot learns from its motions; None for the setup's choice.
+        learning: Learning from the robot's motions; None for the setup's choice.
 
     Raises:
         ValueError: The setup is invalid, or the plant does not fit it.

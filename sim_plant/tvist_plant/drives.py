@@ -48,7 +48,7 @@ class JointParameters(NamedTuple, Generic[T]):
     breakaway: T  # F_s/F_c [-]
     stribeck_speed: T  # v_s [rad/s]
     link: T  # index of the joint's link, as a float [-]
-    gear_stiffness: T  # K_g [N m/rad]
+    gear_stiffness: T  # K_g, called K in `imperfections` [N m/rad]
     gear_damping: T  # D_g [N m s/rad]
     gear_error: T  # amplitude ε of the gear's kinematic error [rad]
     gear_waves: T  # n_w [-]

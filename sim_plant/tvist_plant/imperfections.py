@@ -11,8 +11,8 @@ A gear twisted by δ transmits the torque
     K δ + z                               with hysteresis, ż = r K δ̇ - |δ̇| z r K/z_max  (Dahl 1968);
     0 up to |δ| = b                       with backlash: the laws above then hold for the twist beyond b.
 
-Near standstill, stiction holds a motor by a torque d in addition to F(v). It grows with the angle θ like a spring until
-it breaks away (Dahl 1968; Stribeck 1902):
+Near standstill, stiction holds a motor by a torque d in addition to F(v). This torque grows with the angle θ like a
+spring until the motor breaks away (Dahl 1968; Stribeck 1902):
 
     dd/dθ = σ K (1 - d sgn(θ̇)/most),    most = (F_s + μ_s |τ_g|) exp(-(θ̇/v_s)²)
 

@@ -300,7 +300,7 @@ class SimulatedArm(Plant):
 
 
 class RealArm(Plant):
-    """A plant that cannot be placed. Its own controller may move it (`sight`), or tvist through that (`seen`)."""
+    """A plant that cannot be placed. It may have its own controller: watched (`sight`) or moved by tvist (`seen`)."""
 
     def measure(self) -> Measurement:
         """Return the present measurements without moving the arm.

@@ -31,7 +31,7 @@ MAX_AHEAD = 4000  # largest number of ticks simulated to find the end of a motio
 
 
 class LineSimulation:
-    """A control line simulated ahead without its arm. It advances its arguments; `line_filter` is None for a stop."""
+    """A control line simulated ahead without its arm, by advancing its arguments; `line_filter` is None for a stop."""
 
     def __init__(
         self, trajectory: Trajectory, line_filter: LineFilter | None, shaped: ShapedReference
@@ -232,7 +232,7 @@ class StopPlanner:
         return forecast.path.keeping(MotionLimits(fastest, acceleration, self.jerk), fastest, state.q)
 
     def _ladder(self, wanted: float | None) -> Iterator[float]:
-        """Yield trial decelerations: from the requested one down to the gentlest, then those above the requested one."""
+        """Yield trial decelerations: from the requested one down to the gentlest, then harder ones, rising."""
         first = self.highest if wanted is None else min(max(wanted, GENTLEST_STOP), self.highest)
         down = first
         while down > GENTLEST_STOP:

@@ -43,11 +43,11 @@ class RateLimit:
     def __init__(self, motion: MotionControl, latest: Callable[[], State]) -> None:
         self._motion, self._latest = motion, latest
         self.planning = 0  # remaining ticks of the last ordered plan
-        self._paid = 0  # tick at which all stops and plans are paid
+        self._paid = 0  # tick until which past stops and plans are charged
 
     @property
     def debt(self) -> int:
-        """Ticks until all stops and plans are paid."""
+        """Ticks that are still charged for past stops and plans."""
         return max(self._paid - self._latest().tick, 0)
 
     def charge(self) -> None:

@@ -1,7 +1,7 @@
 """Sockets of programs: received data and waiting readers.
 
-The network is the host's. It gets orders after the programs' turns and reports `SocketNews` before a tick, which the
-journal contains, so that a replay gets the same bytes. A cell's gripper is simulated and answers a tick later.
+The host has the network: it takes orders after the programs' turns and reports `SocketNews` before a tick. The
+journal contains the news, so that a replay gets the same bytes. A cell's gripper is simulated; it answers a tick later.
 """
 
 from collections.abc import Callable, Generator, Iterator, Sequence

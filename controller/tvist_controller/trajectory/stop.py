@@ -53,7 +53,7 @@ class Slowing(Trajectory):
 
     @property
     def finished(self) -> bool:
-        """Whether it has come to rest."""
+        """Whether the stop has come to rest."""
         return self._ticks * PERIOD >= self.duration
 
 
@@ -198,7 +198,7 @@ class SlowedStop(Trajectory):
 
     @property
     def finished(self) -> bool:
-        """Whether it has come to rest."""
+        """Whether the stop has come to rest."""
         return self._ticks >= len(self._samples) - 1
 
     @property
