@@ -16,5 +16,5 @@ def compiled(function: F) -> F:
 
 
 def compiled_for_ticks(function: F) -> F:
-    """Compile a function of microseconds that keeps the GIL, which another thread might otherwise take."""
+    """Compile a function that takes microseconds and keeps the GIL, so that no other thread takes the GIL meanwhile."""
     return compile_function(function)

@@ -108,9 +108,9 @@ def geometry_of(description: RobotDescription, things: Things | None = None) -> 
 
 
 def stopping(description: RobotDescription) -> tuple[Stopping, ...]:
-    """Return the stops without payload and with the rated one, of the joint that takes longest.
+    """Return the stops of the joint that takes longest to stop, without payload and with the rated payload.
 
-    One joint turns, either way, with the arm stretched out. This takes as long as twenty ticks, once per description.
+    One joint turns, either way, with the arm stretched out. The first call for a description takes twenty ticks.
     """
     return _found(msgspec.json.encode(description))
 
@@ -142,7 +142,7 @@ def _found(described: bytes) -> tuple[Stopping, ...]:
 
 
 def _stretched(description: RobotDescription, dynamics: InverseDynamics) -> Floats:
-    """Return the posture with the largest relative holding torque."""
+    """Return the trial posture in which gravity uses the largest share of a joint's torque limit."""
     random, limits = np.random.default_rng(0), np.array(description.limits.torque)
     named = [np.array(pose) for pose in description.poses.values()]
     postures = [*named, *random.uniform(-np.pi, np.pi, (POSTURES, description.joints))]

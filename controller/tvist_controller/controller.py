@@ -31,7 +31,7 @@ class Controller(RobotParts):
 
     Args:
         setup: Initial setup.
-        plant: Plant to control; None for that of the setup, by default its flexible arm.
+        plant: Plant to control; None for the setup's plant, or the flexible arm if the setup has none.
         order: Callback that plans commands of programs outside the ticks; None to plan within the ticks.
 
     Raises:
@@ -106,7 +106,7 @@ class Controller(RobotParts):
     def receive_setpoint(
         self, setpoint: c.Setpoint | Unreadable | None, note: Callable[[], None] | None = None
     ) -> None:
-        """Take a set-point, None if not admitted; `note` journals one of the client in control first."""
+        """Take a set-point, or count one that was refused (None). `note` journals it if its sender has control."""
         self.counters.setpoints_received += 1
         if setpoint is None or not is_holders(self.session.lease, setpoint.token):
             self.counters.setpoints_refused += 1  # not part of the stream or the journal
@@ -119,12 +119,12 @@ class Controller(RobotParts):
             self.counters.setpoints_refused += 1
 
     def client_gone(self, client: str, session: str) -> None:
-        """End the rights that a client's ended session held."""
+        """End the rights of a client whose session has ended."""
         self._look_again()
         self.session.end_rights(client, session)
 
     def fail(self, why: str) -> None:
-        """Handle a plant failure that was detected outside the controller in the next tick."""
+        """In the next tick, handle a plant failure that was detected outside the controller."""
         self._failed = PlantError(why)
 
     # ------------------------------------------------------------------ ticks
@@ -136,7 +136,7 @@ class Controller(RobotParts):
         return report.state, events
 
     def begin_tick(self) -> None:
-        """Begin a control period: handle timeouts and run programs; a watched robot sets the tick number."""
+        """Begin a control period: take a watched robot's tick number, handle timeouts, and run programs."""
         if self.watching is not None:
             tick = self.watching.look()
             self.tick_number = max(self.tick_number, 0 if tick is None else tick - 1)

@@ -36,8 +36,8 @@ class Host:
         controller: The robot.
         sinks: Sinks of its output, in this order.
         ports: Network for sockets of programs; None for no network.
-        learning: What the robot learns from its motions; None for nothing.
-        survives: Whether an exception causes a protective stop and goes to the sinks instead of the caller.
+        learning: Learning from the robot's motions; None if the robot learns nothing.
+        survives: If True, an exception causes a protective stop and goes to the sinks, not to the caller.
     """
 
     def __init__(
@@ -77,7 +77,7 @@ class Host:
         except Exception as error:  # noqa: BLE001  see `survives`
             self._note(entry)  # needed to reproduce the error
             return Refused(code="plant_failure", where="", why=self._stop_for(error))
-        self._carry_out_orders()  # of programs that it has ended
+        self._carry_out_orders()  # socket orders of programs that the command has ended
         # A command of the client in control renews the lease even if it is refused; another client's does not.
         if not isinstance(reply, Refused) or is_holders(
             self.controller.session.lease, getattr(command, "token", None)
@@ -91,7 +91,7 @@ class Host:
 
     @property
     def standing(self) -> ControlHolders:
-        """Present holders of rights, readable from any thread."""
+        """Present holders of control and the clock, readable from any thread."""
         return ControlHolders(self.controller.session.lease, self.controller.session.clock)
 
     def setpoint(self, data: bytes) -> None:
@@ -126,7 +126,7 @@ class Host:
             self._tick()
 
     def _stop_for(self, error: Exception) -> str:
-        """Stop the robot in the next tick after a controller failure, or raise it; return the reason."""
+        """Stop the robot in the next tick after an exception and return the reason; raise it unless `survives`."""
         if not self._survives:
             raise error
         why = f"the controller has failed, see the server's log: {named(error)}"
@@ -196,7 +196,7 @@ class Host:
         raised.clear()
 
     def fail(self, why: str) -> None:
-        """Handle a failure of the arm outside the controller, such as of its tick source, next tick."""
+        """In the next tick, handle a failure outside the controller, such as of the arm's tick source."""
         self.controller.fail(why)
 
     def leave_arm(self) -> None:
@@ -229,7 +229,7 @@ class Host:
         return self.controller.cell.answer(request)
 
     def warn(self, why: str) -> None:
-        """Warn clients about something outside the controller, which a replay does not repeat."""
+        """Send clients a warning about something outside the controller; a replay does not repeat this warning."""
         event = Event(tick=self._next, kind="warning", why=why)
         for sink in self._sinks:
             sink.event(event)

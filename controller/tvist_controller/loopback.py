@@ -22,7 +22,7 @@ class LoopbackHost(Sink):
     Args:
         setup: Initial setup with the clock `free` or `lockstep`.
         plant: Plant to control; None for the setup's flexible arm.
-        learning: What the robot learns from its motions; None for the setup's choice.
+        learning: Learning from the robot's motions; None for the setup's choice.
 
     Raises:
         ValueError: The setup is invalid, or the plant does not fit it.
@@ -49,7 +49,7 @@ class LoopbackHost(Sink):
         return self._host.info()
 
     def subscribe(self, topic: Topic, callback: Callable[[bytes], object]) -> Callable[[], None]:
-        """Call a function with each message of a topic, first the present state or io; return its end."""
+        """Call a function with each message of a topic, first the present state or io; return a function to end it."""
         callbacks = self._callbacks.setdefault(topic, [])
         callbacks.append(callback)
         if topic == "state":

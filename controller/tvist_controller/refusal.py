@@ -32,7 +32,7 @@ class RefusalError(Exception):
 def invalid(
     field: str, value: object, must: str, limit: float | None = None, code: Code = "out_of_range"
 ) -> RefusalError:
-    """Return the refusal of a field's value, which must be something else."""
+    """Return the refusal of a field's value; `must` says what it must be."""
     return RefusalError(code, field, f"{field} is {value}: must be {must}", limit)
 
 
@@ -47,7 +47,7 @@ def wrong_mode(why: str, field: str = "") -> RefusalError:
 
 
 def out_of_turn(command: str, activity: Activity) -> RefusalError:
-    """Return the refusal of a command `type` that is not allowed in the present activity."""
+    """Return the refusal of a command, given by its `type`, that is not allowed in the present activity."""
     code: Code = "wrong_mode"
     if activity is Activity.PROTECTIVE_STOPPING:
         why = "safety_mode is PROTECTIVE_STOP: send unlock_protective_stop once the arm is at rest"

@@ -1,4 +1,4 @@
-"""Initial setup of a controller: everything besides clients' messages that determines its behaviour."""
+"""Initial setup of a controller: with the clients' messages, this determines all of its behaviour."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -153,7 +153,7 @@ class Setup:
         return made
 
     def standing(self, plant: Plant | None) -> "Setup":
-        """Return the setup for a plant; one that cannot be placed starts at its present position.
+        """Return the setup for a plant: a plant that cannot be placed starts at its present position.
 
         Raises:
             ValueError: See `measured_standing`.

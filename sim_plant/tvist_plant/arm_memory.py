@@ -39,7 +39,7 @@ class ArmMemory(NamedTuple):
 
 
 def shapes(N: int, n: int) -> ArmMemory:
-    """Shapes of the parts."""
+    """Return the shape of each part of the memory."""
     sizes = (
         (6, N + n), (2, 3, n), (2, N + 1, N), (2, N + n), (ROWS, n), (N + 1, WIDTH), (N + 1, SCRATCH),
         (N,), (N,), (n,), (N, N), (N + n,),

@@ -61,7 +61,7 @@ def _place(row: Floats, placement: pin.SE3) -> None:
 
 @compiled
 def turn(R: Floats, row: Floats) -> None:
-    """Multiply the rotation R by that of a link from the right, in place."""
+    """Multiply the rotation R from the right by the rotation in a link's row, in place."""
     for i in range(3):
         x, y, z = R[i, 0], R[i, 1], R[i, 2]
         R[i, 0] = x * row[0] + y * row[3] + z * row[6]
@@ -98,7 +98,7 @@ def start(R: Floats, o: Floats) -> None:
 
 @compiled
 def twist(R: Floats, o: Floats, S: Floats) -> None:
-    """Compute the twist of a unit velocity about a frame's z axis: angular, then linear at the base."""
+    """Compute the twist of a unit velocity about a frame's z axis: angular, then linear at the base origin."""
     x, y, z = R[0, 2], R[1, 2], R[2, 2]
     S[0], S[1], S[2] = x, y, z
     S[3], S[4], S[5] = o[1] * z - o[2] * y, o[2] * x - o[0] * z, o[0] * y - o[1] * x
@@ -137,7 +137,7 @@ def placed(row: Floats, R: Floats, o: Floats, inertia: Floats) -> None:
 
 @compiled
 def momentum(I: Floats, V: Floats) -> tuple[float, float, float, float, float, float]:
-    """Return inertia times twist (or its derivative): moment about the base origin, then force."""
+    """Return inertia times a twist or a twist's derivative: moment about the base origin, then force."""
     m, hx, hy, hz = I[0], I[1], I[2], I[3]
     a, b, c, u, v, w = V[0], V[1], V[2], V[3], V[4], V[5]
     return (
@@ -154,7 +154,7 @@ def momentum(I: Floats, V: Floats) -> tuple[float, float, float, float, float, f
 def sweep(chain: Floats, q: Floats, qd: Floats, qdd: Floats, gravity: float, scratch: Floats) -> None:
     """Compute twist S, inertia, velocity V and force F of each body, from the base to the end.
 
-    Rows of the scratch: `SCRATCH`; the last one holds the last body's acceleration instead of a force.
+    For the scratch's columns see `SCRATCH`; the last row holds the last body's acceleration, not a force.
     """
     R, o, A = np.empty((3, 3)), np.empty(3), np.empty(6)
     start(R, o)
@@ -207,7 +207,7 @@ def along(S: Floats, F: Floats) -> float:
 
 @compiled
 def collect_torques(scratch: Floats, torque: Floats) -> None:
-    """Compute the joint torques after a sweep [N m]; each F then holds the sum over all outer bodies."""
+    """Compute the joint torques after a sweep [N m]; each F in the scratch then includes those of all outer bodies."""
     for i in range(torque.shape[0] - 1, -1, -1):
         F = scratch[i, 22:28]
         torque[i] = along(scratch[i, :6], F)
@@ -218,7 +218,7 @@ def collect_torques(scratch: Floats, torque: Floats) -> None:
 
 @compiled
 def collect_gravity(scratch: Floats, gravity: float, torque: Floats) -> None:
-    """Compute the joint torques that balance gravity after a sweep at any velocities, shape (N,) [N m]."""
+    """Compute the joint torques that balance gravity, after a sweep with any velocities, shape (N,) [N m]."""
     m = x = y = 0.0
     for j in range(torque.shape[0] - 1, -1, -1):
         row = scratch[j]
@@ -228,7 +228,7 @@ def collect_gravity(scratch: Floats, gravity: float, torque: Floats) -> None:
 
 @compiled
 def collect_inertia(scratch: Floats, M: Floats) -> None:
-    """Compute the upper triangle of M after a sweep [kg m^2]; inertias then include all outer bodies."""
+    """Compute the upper triangle of M after a sweep [kg m^2]; inertias in the scratch then include all outer bodies."""
     W = np.empty(6)
     for k in range(M.shape[0] - 1, -1, -1):
         inertia = scratch[k, 6:16]

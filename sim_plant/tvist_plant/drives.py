@@ -39,26 +39,26 @@ class DriveCommand:
 class JointParameters(NamedTuple, Generic[T]):
     """Parameters of the drive and gear of one joint (floats), or of all joints (arrays of shape (n,))."""
 
-    rotor_inertia: T  # b [kg m^2]
-    velocity_gain: T  # k_d [N m s/rad]
-    position_gain: T  # k_d (K_p + K_i) [N m/rad]
-    integral_gain: T  # k_d K_p K_i [N m/(rad s)]
-    friction: T  # f_c; zero if friction is modelled as linear [N m]
+    rotor_inertia: T  # B [kg m^2]
+    velocity_gain: T  # K_d [N m s/rad]
+    position_gain: T  # K_d (K_p + K_i) [N m/rad]
+    integral_gain: T  # K_d K_p K_i [N m/(rad s)]
+    friction: T  # F_c; zero if friction is modelled as linear [N m]
     friction_width: T  # w [rad/s]
-    breakaway: T  # f_s/F_c [-]
+    breakaway: T  # F_s/F_c [-]
     stribeck_speed: T  # v_s [rad/s]
-    link: T  # index of its link, as a float [-]
-    gear_stiffness: T  # k [N m/rad]
-    gear_damping: T  # d [N m s/rad]
+    link: T  # index of the joint's link, as a float [-]
+    gear_stiffness: T  # K_g, called K in `imperfections` [N m/rad]
+    gear_damping: T  # D_g [N m s/rad]
     gear_error: T  # amplitude ε of the gear's kinematic error [rad]
     gear_waves: T  # n_w [-]
     gear_phase: T  # φ [rad]
-    softness: T  # k - K₁ [N m/rad]
+    softness: T  # K - K₁ [N m/rad]
     soft_angle: T  # δ₁ [rad]
     hysteresis: T  # r K [N m/rad]
     hysteresis_torque: T  # z_max [N m]
     backlash: T  # b [rad]
-    stiction: T  # f_s of the stiction [N m]
+    stiction: T  # F_s of the stiction [N m]
     stiction_load: T  # μ_s [-]
     stiction_speed: T  # v_s of the stiction [rad/s]
     stiction_stiffness: T  # σ K [N m/rad]
@@ -67,7 +67,7 @@ class JointParameters(NamedTuple, Generic[T]):
 def joint_parameters(
     description: RobotDescription, imperfections: Imperfections, links: Integers | int = 0
 ) -> JointParameters[Floats]:
-    """Return those of an arm, with phases 0; raise ValueError unless lists have one value per joint."""
+    """Return the parameters of an arm, with phases 0; raise ValueError unless lists have one value per joint."""
     n, drives, limit = description.joints, description.drives, np.array(description.limits.torque)
     K, K_d, K_p, K_i = map(
         np.array,
@@ -126,7 +126,7 @@ def springs_and_dampers(
 ) -> tuple[Floats, Floats]:
     """Return stiffness [N m/rad] and damping [N m s/rad] of N links, then n motors, shape (N+n, N+n) each.
 
-    They are the same in every posture, and include the drives' gains and the slope of friction at rest.
+    Both matrices are the same in every posture, and include the drives' gains and the slope of friction at rest.
     """
     size, link = flexible.model.nv, flexible.joints
     motor = size + np.arange(len(link))

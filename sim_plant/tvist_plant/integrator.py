@@ -43,7 +43,7 @@ def cholesky(S: Floats) -> None:
 
 @compiled
 def solve(L: Floats, x: Floats) -> None:
-    """Replace the first part of x by (L Lᵀ)⁻¹ x, with L from `cholesky`."""
+    """Replace x, as far as L reaches, by (L Lᵀ)⁻¹ x, with L from `cholesky`."""
     n = L.shape[0]
     for i in range(n):
         value = x[i]
@@ -94,7 +94,7 @@ def set_points(commands: Floats, j: int, share: float) -> tuple[float, float, fl
 
 @compiled
 def softened(joint: JointParameters[float], twist: float) -> float:
-    """Return a gear's torque minus K δ, due to backlash or softness near zero [N m]."""
+    """Return the part of a gear's torque beyond K δ, which backlash and softness near zero cause [N m]."""
     loose = min(max(twist, -joint.backlash), joint.backlash)
     soft = joint.softness * min(max(twist - loose, -joint.soft_angle), joint.soft_angle)
     return float(-joint.gear_stiffness * loose - soft)
@@ -102,7 +102,7 @@ def softened(joint: JointParameters[float], twist: float) -> float:
 
 @compiled
 def dragged(joint: JointParameters[float], z: float, twist: float) -> float:
-    """Return the hysteresis torque of a joint's gear after a further twist [N m]."""
+    """Return the hysteresis torque of a joint's gear, z before a further twist, after this twist [N m]."""
     if joint.hysteresis > 0.0:
         return relaxed(z, twist, joint.hysteresis, joint.hysteresis_torque)
     return z
@@ -110,7 +110,7 @@ def dragged(joint: JointParameters[float], z: float, twist: float) -> float:
 
 @compiled
 def stuck(joint: JointParameters[float], d: float, way: float, speed: float, load: float) -> float:
-    """Return the stiction torque of a joint's motor after it has turned [N m]."""
+    """Return the stiction torque of a joint's motor, d before a turn by `way`, after this turn [N m]."""
     law = joint.stiction, joint.stiction_load, joint.stiction_speed, joint.stiction_stiffness
     return stiction_after(d, way, speed, load, *law)
 
@@ -153,7 +153,7 @@ def advance(arm: ArmMemory, head: Floats) -> None:  # noqa: C901, PLR0912, PLR09
     bias, last_bias = arm.dynamics[NOW, links], arm.dynamics[LAST, links]
     springs, f = arm.springs, arm.force
     h = period / substeps
-    sticks = False  # keeps arms without stiction fast
+    sticks = False  # whether any motor has stiction; without it, the loops below are faster
     for j in range(n):
         joint = of_joint(arm.joints, j)
         sticks = sticks or joint.stiction > 0.0 or joint.stiction_load > 0.0
@@ -225,7 +225,7 @@ def advance(arm: ArmMemory, head: Floats) -> None:  # noqa: C901, PLR0912, PLR09
 
 @compiled
 def balance(arm: ArmMemory, moment: Floats) -> None:
-    """Compute link accelerations (`arm.qdd`) and motor torques (`moment`, shape (n,) [N m]) at this state."""
+    """Compute link accelerations (`arm.qdd`) and motor torques (`moment`, shape (n,) [N m]) in the present state."""
     n, links, qdd = arm.joints.shape[1], arm.qdd.shape[0], arm.qdd
     y, v, s, z = arm.state[0], arm.state[1], arm.state[3], arm.state[4]
     command, M, springs, S = arm.commands[NOW], arm.dynamics[NOW], arm.springs, arm.factor

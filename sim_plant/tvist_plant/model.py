@@ -39,7 +39,7 @@ class FlexibleModel:
     bare: pin.Inertia  # body of the last joint, without payload
 
     def carry(self, payload: Payload) -> None:
-        """Change the payload in place, since a new model takes half a tick; both are equal up to rounding."""
+        """Change the payload in place, since a new model takes half a tick; results are equal up to rounding."""
         place = self.model.frames[self.flange].placement
         self.model.inertias[self.model.njoints - 1] = (
             self.bare + place.act(payload_inertia(payload)) if payload.mass > 0.0 else self.bare
@@ -115,7 +115,7 @@ def holding_torque(model: pin.Model, q: Floats) -> Floats:
 
 
 def carries_weight(description: RobotDescription) -> bool:
-    """Return whether gravity can load any joint, which it cannot if all axes are vertical."""
+    """Return whether gravity can load any joint; it cannot if all axes are vertical."""
     turns = [link_frame(description, number).rotation for number in range(description.joints - 1)]
     return any(np.hypot(turn[0, 2], turn[1, 2]) > 1e-9 for turn in turns)
 

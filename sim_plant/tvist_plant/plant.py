@@ -173,7 +173,7 @@ class Plant(ABC):
 
     @property
     def condition(self) -> Condition:
-        """Present condition. If it stops being ready while the robot runs, the robot stops."""
+        """Present condition. If the drives stop being ready while the robot runs, the robot stops."""
         return Condition(ready=True)
 
     def switch(self, *, power: bool, brakes: bool) -> None:
@@ -193,12 +193,12 @@ class Plant(ABC):
 
     @property
     def watched(self) -> bool:
-        """Whether its own controller moves it while tvist watches; see `RealArm.sight`."""
+        """Whether the arm's own controller moves the arm and tvist only watches; see `RealArm.sight`."""
         return False
 
     @property
     def supervised(self) -> bool:
-        """Whether tvist moves it through its own controller; see `RealArm.seen`."""
+        """Whether tvist moves the arm through the arm's own controller; see `RealArm.seen`."""
         return False
 
     def truth(self) -> PlantTruth | None:
@@ -248,7 +248,7 @@ class Plant(ABC):
         return np.zeros(3)
 
     def obstacle(self, q: Floats, payload: Payload | None) -> str | None:
-        """Return what the arm would overlap after a reset, None if nothing; the state does not change.
+        """Return what the arm would overlap if it were reset, None if nothing; the state does not change.
 
         Args:
             q: Joint angles of the reset, shape (n,) [rad].
@@ -300,7 +300,7 @@ class SimulatedArm(Plant):
 
 
 class RealArm(Plant):
-    """A plant that cannot be placed; its own controller may move it (`sight`) or supervise it (`seen`)."""
+    """A plant that cannot be placed. It may have its own controller: watched (`sight`) or moved by tvist (`seen`)."""
 
     def measure(self) -> Measurement:
         """Return the present measurements without moving the arm.
@@ -312,12 +312,12 @@ class RealArm(Plant):
 
     @property
     def watched(self) -> bool:
-        """Whether its own controller moves it: commands have no effect, and `step` only measures."""
+        """Whether the arm's own controller moves the arm: commands have no effect, and `step` only measures."""
         return self.can(RealArm.sight) and self.can(Plant.wait)
 
     @property
     def supervised(self) -> bool:
-        """Whether tvist moves it through its own controller, which follows the set-points and may stop it."""
+        """Whether tvist moves the arm through the arm's own controller, which follows set-points and may stop."""
         needed = (RealArm.seen, RealArm.described, Plant.wait, Plant.switch, Plant.stop)
         return all(self.can(method) for method in needed)
 
@@ -330,7 +330,7 @@ class RealArm(Plant):
         self._lacks("sight")
 
     def interval(self) -> float:
-        """Return the interval at which its cycles arrive [s]."""
+        """Return the interval at which the arm's cycles arrive [s]."""
         return PERIOD
 
     def seen(self) -> Sight:

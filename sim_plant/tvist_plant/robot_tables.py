@@ -263,11 +263,11 @@ class RobotDescription(_Table, frozen=True, forbid_unknown_fields=True, kw_only=
         return replace(self, collision=replace(self.collision, has_floor=False))
 
     def clean(self) -> "RobotDescription":
-        """Return the arm without noise, gear error and Coulomb friction, whose linear equivalent stays."""
+        """Return the arm without noise and gear error, and with linear instead of Coulomb friction."""
         return self.disturbed_by(())
 
     def disturbed_by(self, kept: Collection[str]) -> "RobotDescription":
-        """Return the arm with only these `DISTURBANCES`; the linear equivalent of Coulomb friction stays."""
+        """Return the arm with only these `DISTURBANCES`; unless "friction" is kept, friction is linear."""
         for name in kept:
             if name not in DISTURBANCES:
                 raise DescriptionError(f"disturbance is {name!r}: must be one of {', '.join(DISTURBANCES)}")

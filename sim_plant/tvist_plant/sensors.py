@@ -9,7 +9,7 @@ from tvist_plant.model import Floats
 
 
 def _rows(draw: Callable[[], Floats]) -> Iterator[Floats]:
-    """Draw noise in blocks, since one call of the generator takes as long as a hundred samples."""
+    """Draw noise in blocks, since each call of the generator costs as much time as a hundred samples."""
     while True:
         yield from draw()
 

@@ -76,7 +76,7 @@ def _named(element: Element) -> str:
 
 
 def _check_numbers(root: Element) -> None:
-    """Check the numbers of all elements that are read, and rewrite them for every parser."""
+    """Check the numbers of all elements that are read, and rewrite them in a form that every parser accepts."""
     for (kind, at), keys in NUMBERS.items():
         for element in root.findall(kind):
             for part, (key, default) in product(element.findall(at), keys.items()):
@@ -254,7 +254,7 @@ def _about_z(axis: Element | None) -> Floats:
 
 
 def _meshes(number: int, link: Element, frame: pin.SE3, path: Path) -> list[dict[str, Any]]:
-    """Return the meshes of a link, whose frame is given relative to the robot file's link `number`."""
+    """Return the meshes of a link; `frame` is the link's frame relative to the robot file's link `number`."""
     found = []
     for visual in link.findall("visual"):
         mesh, origin = visual.find("geometry/mesh"), visual.find("origin")
@@ -283,7 +283,7 @@ def mesh_file(name: str, urdf: Path) -> Path:
 
 
 def _limits(chain: list[Element]) -> tuple[dict[str, list[float]], str]:
-    """Return the table `limits`, and what was assumed about positions."""
+    """Return the table `limits`, and a text about assumed position limits."""
     limits: dict[str, list[float]] = {"position": [], "velocity": [], "torque": []}
     notes = []
     for joint in chain:

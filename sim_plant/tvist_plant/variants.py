@@ -1,7 +1,7 @@
-"""Plants by name: arms that deviate from the robot file, which their controller uses, in one way or in many.
+"""Plants by name: arms that deviate, in one way or in many, from the robot file that their controller uses.
 
-A hidden robot deviates in all parameters, as a real one would: each by an independent uniform factor within 1
-± a share.
+A hidden robot deviates in all parameters, as a real one would: each is multiplied by an independent factor,
+uniform within 1 ± a share.
 """
 
 from collections.abc import Callable, Mapping
@@ -89,7 +89,7 @@ class Variant:
 def _changed(
     description: RobotDescription, drives: Mapping[str, float], links: Mapping[str, float], factors: Factors
 ) -> RobotDescription:
-    """Multiply parameters of drives and bending links by random factors of their shares."""
+    """Multiply parameters of drives and bending links by `factors(share, shape)`, with the given shares."""
 
     def changed(table: Drives | LinkFlexibility, shares: Mapping[str, float]) -> Any:
         own = {name: np.array(getattr(table, name)) for name in shares}
@@ -123,7 +123,7 @@ def stiffer(factor: float, description: RobotDescription, _seed: int = 0) -> Rob
 
 
 def _sharper(share: float, description: RobotDescription, _seed: int) -> RobotDescription:
-    """Scale the speed within which friction changes sign; friction is then never linear."""
+    """Multiply the speed range within which friction changes sign by `share`, and make friction nonlinear."""
     drives = description.drives
     return structs.replace(
         description,
@@ -134,7 +134,7 @@ def _sharper(share: float, description: RobotDescription, _seed: int) -> RobotDe
 def rubbed(
     factors: Mapping[str, float | tuple[float, ...]], description: RobotDescription, _seed: int = 0
 ) -> RobotDescription:
-    """Return an arm with stiction, its friction multiplied by factors such as `HEAVIER`."""
+    """Return the arm with stiction, friction and other imperfections multiplied by factors such as `HEAVIER`."""
     own = {"coulomb_friction": description.drives.coulomb_friction, **description.imperfections.given()}
     new = {name: (np.array(value) * factors.get(name, 1.0)).tolist() for name, value in own.items()}
     drives = structs.replace(description.drives, coulomb_friction=tuple(new.pop("coulomb_friction")))
@@ -165,7 +165,7 @@ def _unlike(description: RobotDescription, seed: int) -> RobotDescription:
 
 
 def _all_at_once(description: RobotDescription, seed: int) -> RobotDescription:
-    """Return an arm with scattered springs, and friction that changes sign over half the speed range."""
+    """Return an arm with scattered springs, and with friction that changes sign within half the speed range."""
     return _off(SCATTER, 61, _sharper(0.5, description, seed), seed, SPRINGS)
 
 
@@ -252,7 +252,7 @@ VARIANTS = {one.name: one for one in _ALL}
 
 
 def variant(name: str) -> Variant:
-    """Return one of `VARIANTS`, or the hidden robot of the name `hidden-SEED`."""
+    """Return the plant of this name: one of `VARIANTS`, or a hidden robot, `hidden-SEED`."""
     kind, dash, number = name.partition("-")
     if kind == "hidden" and dash and number.isascii() and number.isdigit() and len(number) < 19:
         return hidden_variant(int(number))
@@ -273,7 +273,7 @@ def hidden_variant(seed: int) -> Variant:
 
 
 def scattered(share: float) -> Variant:
-    """Return an arm with the stiffness and gains of gears, links and loops changed by ± a share at random."""
+    """Return an arm whose stiffness and gains (gears, links, loops) are raised or lowered at random by a share."""
     if share == 0.0:
         return AS_DESCRIBED
     percent = f"{100.0 * share:g}"

@@ -70,7 +70,7 @@ class GripperModel(_Table, frozen=True, kw_only=True):
 
     @property
     def stroke(self) -> float:
-        """Opening [m]."""
+        """Distance between the open fingers [m]."""
         return STROKES[self.model]
 
 
@@ -157,7 +157,7 @@ def bit_of(terminal: Terminal) -> int:
 
 
 def _repeated(names: Sequence[str]) -> list[tuple[int, int]]:
-    """Return the places of names that stood before, and where they first did."""
+    """Return two indices for each repeated name: those of the repetition and of the first occurrence."""
     return [(number, names.index(name)) for number, name in enumerate(names) if name in names[:number]]
 
 

@@ -106,7 +106,7 @@ class Gripper:
 
     @property
     def _fault(self) -> int:
-        """Fault: automatic release running (11) or over (15); request before (7), during (5) activation."""
+        """Fault code: 11 or 15 during or after automatic release; 7 or 5 for a request before or during activation."""
         if self._written["ATR"]:
             return 15 if self._released else 11
         if self._written["GTO"] and not self._active:
@@ -133,7 +133,7 @@ class Gripper:
 
     @property
     def _stopped(self) -> bool:
-        """Whether the part between the fingers blocks them."""
+        """Whether a part between the fingers prevents the requested closing."""
         return self.holds and self._target is not None and self._target >= self._position
 
     @property
@@ -146,7 +146,7 @@ class Gripper:
         return (slow + share * (fast - slow)) * PERIOD / self.stroke * (CLOSED - OPEN)
 
     def tick(self, meet: Meet) -> Moved:
-        """Move the fingers for a tick; `meet` finds a part while they close and hold nothing."""
+        """Move the fingers for a tick; while they close and hold nothing, `meet` finds the part between them."""
         target, position = self._target, self._position
         if target is None:
             return _NOTHING
@@ -193,7 +193,7 @@ class Requests:
         self._received = b""
 
     def cut(self, data: bytes) -> list[bytes]:
-        """Return the requests completed by new data; one without a line feed counts only if it arrived alone."""
+        """Return the requests that new data completes; a GET without line feed is complete if it arrives alone."""
         if not self._received and _BARE_GET.fullmatch(data):
             return [data]
         *lines, rest = (self._received + data).split(b"\n")

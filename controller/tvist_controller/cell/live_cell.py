@@ -99,7 +99,7 @@ class LiveCell:
         self.begin(plant.payload)
 
     def begin(self, load: Payload) -> None:
-        """Reset to the start, with this payload without a part."""
+        """Reset to the start; `load` is the carried payload while the gripper holds no part."""
         self._wires = Wires(self._cell.wires)
         if self.gripper is not None:
             self.gripper.begin()
@@ -149,14 +149,14 @@ class LiveCell:
             return
         if self._held is not None:
             self._put_down(q)
-            self._share = 0  # it stays with the tool
+            self._share = 0  # the part stays with the removed tool
         self._tool = tool
         own = Payload(mass=tool.mass, com=tool.cog, inertia=tool.inertia)
         self._load = self.empty if tool is self._cell.tools[0] else own
         self._emit("text", why=f"cell: the tool {tool.name} ({tool.mass:g} kg) is on the flange")
 
     def _move_real_fingers(self, gripper: Gripper, hand: Plant) -> None:
-        """Move fingers that touch simulated objects: whatever stops them counts as gripped."""
+        """Move fingers whose contacts the plant simulates: an object that stops the fingers counts as gripped."""
         opening = hand.opening()
         if gripper.holds and opening < gripper.opening - STALLED:
             self._emit("warning", why="cell: the gripper has lost what it held")
@@ -179,7 +179,7 @@ class LiveCell:
             self._tell_missed(q)
 
     def _between(self, wide: float, narrow: float, q: Floats) -> float | None:
-        """Return the width of the part met between two openings, see `Meet` [m]."""
+        """Return the width of the part that closing fingers meet between two openings [m]; see `Meet`."""
         self._met, limits, nearest = None, self._cell.gripper, np.inf
         if limits is None or self._tool is not self._cell.gripping_tool:  # the fingers are not on the arm
             return None

@@ -42,7 +42,7 @@ class Admitted(NamedTuple):
 
 
 def admit(data: bytes, lease: Lease | None, clock: Lease | None = None) -> Admitted | Refused:
-    """Decode a command and check its sender's rights; of a long command, check the token before decoding."""
+    """Decode a command and check its sender's rights; check the token of a long command before decoding."""
     try:
         if len(data) > EXPLAINED_BYTES:
             _check_envelope(decode_envelope(data), len(data), lease, clock)
@@ -63,7 +63,7 @@ def admit_command(command: Command, lease: Lease | None, clock: Lease | None = N
 
 
 def admit_setpoint(data: bytes, lease: Lease | None) -> Setpoint | Unreadable | None:
-    """Decode a set-point; return None unless its sender may have control, which the lease decides later."""
+    """Decode a set-point; return None unless its token is that of `lease`. The controller checks the token again."""
     if lease is None or len(data) > EXPLAINED_BYTES:
         return None
     setpoint: Setpoint | Unreadable

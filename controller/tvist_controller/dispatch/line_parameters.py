@@ -31,10 +31,10 @@ class LineParameters:
         source: ModeSource,
         motion: MotionControl,
         peripherals: Peripherals,
-        plan: Callable[[PayloadLesson, FilterState], Plan],  # plans what a lesson changes
+        plan: Callable[[PayloadLesson, FilterState], Plan],  # plans the change that a lesson requires
         emit: Emit,
         *,
-        follows: bool,  # whether the robot follows its payload
+        follows: bool,  # whether the robot learns its payload from its motions
     ) -> None:
         self.declared = payload
         self.assumed = payload  # payload for dynamics and modes: the declared or the learnt one
@@ -54,12 +54,12 @@ class LineParameters:
     # ------------------------------------------------------------------ filter
 
     def choose(self, chosen: FilterChoice) -> None:
-        """Use a filter from now on, or refuse it if the rest of the motion would collide."""
+        """Use a filter from now on; raise RefusalError if the rest of the motion would then collide."""
         self._motion.ahead.check_filter(chosen.tvist)
         self.use(chosen)
 
     def estimate(self, chosen: FilterChoice) -> None:
-        """Use other modes from now on, as `choose`."""
+        """Use a filter with modes from another estimator, as `choose` does; warn if they do not suit the payload."""
         self.choose(chosen)
         self._warn_of_payload()
 
@@ -79,7 +79,7 @@ class LineParameters:
     # ------------------------------------------------------------------ payload
 
     def learn(self, lesson: PayloadLesson, plan: Plan | None = None) -> None:
-        """Take a lesson at rest, with a plan made in advance if it is still valid."""
+        """At rest, use the payload of a lesson, with a plan made in advance if that is still valid."""
         present = self.present()
         if plan is None or plan.state != {"filter": present}:
             plan = self._plan(lesson, present)
@@ -110,12 +110,12 @@ class LineParameters:
         self._emit("learnt", why=f"the declared {self.declared.mass:g} kg are assumed again")
 
     def _clear_with(self, payload: Payload, tvist: Filter | None) -> None:
-        """Put a payload into the collision model, or refuse it if the rest of the motion would collide."""
+        """Put a payload into the collision model; raise RefusalError if the rest of the motion would then collide."""
         move = self._motion.motions.move
         self._motion.ahead.check_payload(body(payload), tvist, () if move is None else move.coming)
 
     def _assume(self, payload: Payload, tvist: Filter | None, ticks: int, *, told: bool = False) -> None:
-        """Phase in a payload with its filter, if modes differ; `told`: an overload warning was sent."""
+        """Phase in a payload, and its filter unless None; `told`: clients are warned of an overload separately."""
         self.assumed, carried = payload, body(payload)
         self._cycle.dynamics.declare(carried, ticks)
         if tvist is not None:
@@ -126,7 +126,7 @@ class LineParameters:
 
     @property
     def _idle(self) -> bool:
-        """Whether there is no shaper, so that modes do not matter."""
+        """Whether shaping is off, so that vibration modes have no effect."""
         return self._cycle.tvist.name == "none"
 
     def _warn_of_payload(self) -> None:

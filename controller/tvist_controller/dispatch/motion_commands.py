@@ -99,7 +99,7 @@ def _check_speed(command: m.SpeedJ, description: RobotDescription) -> None:
 
 
 def _begun(begin: Callable[[RobotParts, Any], int]) -> Callable[[RobotParts, CommandCall[Any]], Reply]:
-    """Return the handler of a command that begins a motion, which tells the motion's number."""
+    """Return the handler of a command that begins a motion; its reply contains the motion's number."""
     return lambda robot, call: Accepted(id=begin(robot, call.command))
 
 

@@ -15,13 +15,13 @@ class Lease(NamedTuple):
     client: str
     token: str
     session: str | None
-    """Session whose end ends it; empty if the client's token does not name it, None without a token."""
+    """Session whose end ends the hold; empty if the client's token names no session, None without a token."""
     seconds: float = math.inf
     """Duration without renewal [s]; infinite for the clock, since nothing times out in simulated time."""
 
 
 class _Words(NamedTuple):
-    """Texts of refusals for one of the two rights."""
+    """Words in refusals that differ between the two rights: control and the clock."""
 
     nobody: str
     whose: str
@@ -44,7 +44,7 @@ CLOCK = _Words(
 
 
 def check_token(held: Lease | None, token: str, where: str = "token", words: _Words = CONTROL) -> Lease:
-    """Return the lease, or with `CLOCK` the hold of the clock, of a token, or raise RefusalError."""
+    """Return `held` (a lease, or a hold of the clock with `CLOCK`) if it has this token, else raise RefusalError."""
     if held is None:
         raise RefusalError("no_control", where, words.nobody)
     if token != held.token:
@@ -96,12 +96,12 @@ class ControlHolders(NamedTuple):
     clock: Lease | None  # hold of the client with the clock
 
     def sessions_of(self, client: str) -> set[str | None]:
-        """Return the sessions whose end takes control or the clock from a client."""
+        """Return the sessions for which a client has control or the clock."""
         return {right.session for right in self if right is not None and right.client == client}
 
 
 class Authority:
-    """The lease of a robot, whose end stops motion, and the hold of its clock; `instance` makes tokens unique."""
+    """Lease and hold of the clock of a robot. The end of a lease stops motion; `instance` makes tokens unique."""
 
     def __init__(
         self,
@@ -158,7 +158,7 @@ class Authority:
             self._lose(f"client {client!r} is gone")
 
     def release(self) -> None:
-        """End the lease and its motion at the holder's request."""
+        """End the lease, and the motion, at the holder's request."""
         self.lease = None
         self._interrupt("control was released")
 

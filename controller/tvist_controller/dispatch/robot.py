@@ -43,7 +43,7 @@ class RobotParts(ABC):
     """The parts of one robot, on which commands act; a `Controller` creates them."""
 
     def __init__(self, setup: Setup, plant: Plant | None, planner: MakesPlans, order: Order | None) -> None:
-        self.setup = setup  # initial setup; for an arm that cannot be placed, with its initial posture
+        self.setup = setup  # initial setup; if the arm cannot be placed, `q` is its measured initial posture
         self.tick_number = 0
         self.counters = Counters()
         self.events: list[Event] = []  # events of the present tick, or of the next one between ticks
@@ -113,7 +113,7 @@ class RobotParts(ABC):
 
     @property
     def declared(self) -> Payload:
-        """Declared payload; for a watched robot the one it reports, if any."""
+        """Declared payload; for a watched robot, the payload that it reports, if any."""
         declared = self.assumed.declared
         return declared if self.watching is None else self.watching.declared(declared)
 
@@ -128,7 +128,7 @@ class RobotParts(ABC):
         return fingerprint(self.setup.description)
 
     def snapshot(self, time: float | None = None) -> PlanningState:
-        """Return the state that plans depend on; with a time, of a path that continues the motion."""
+        """Return the state for plans; if `time` [s] is given, for a path that extends the running motion after it."""
         return self.motion.snapshot(self.assumed.present(), self.programs.statements.last, time)
 
     def io(self, *, wrench: bool = True) -> Io:
@@ -154,7 +154,7 @@ class RobotParts(ABC):
         )  # fmt: skip
 
     def emit(self, kind: EventKind, **fields: Unpack[Fields]) -> None:
-        """Store an event of the present tick, or of the next one between ticks."""
+        """Store an event of the present tick; an event between two ticks belongs to the next tick."""
         event = Event(tick=self.tick_number + 1, kind=kind, **fields)
         self.events.append(event)
         self.modes.hear(event)
@@ -166,7 +166,7 @@ class RobotParts(ABC):
 
 
 def _cycle(setup: Setup, first: FilterChoice, plant: Plant | None) -> ControlCycle:
-    """Create the control line with its arm; raise ValueError for an invalid start or a missing truth."""
+    """Create the control line and its arm. If the start is invalid, or no truth can be published, raise ValueError."""
     try:
         cycle = ControlCycle(
             setup.description, first.tvist, elastic=first.elastic, q=np.array(setup.q, dtype=float),

@@ -60,7 +60,7 @@ _RIGHTS = (
 
 
 def _filter(make: Any) -> Planning:
-    """Return a plan of the filter planner, from the command and the present filter's state."""
+    """Return how to plan a command by `make(filter planner, command, state of the present filter)`."""
     return Planning(FILTER, FilterPlanner, lambda planner, command, now: make(planner, command, now.filter))
 
 

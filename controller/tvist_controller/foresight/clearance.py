@@ -1,9 +1,9 @@
 """Distances between capsules of an arm and the floor, and lower bounds while joints turn, compiled.
 
-A capsule is everything within its radius of its axis. The distance between two bodies changes only with the
-joints between them. Joint j turning at q̇_j changes it by at most |q̇_j| times the smaller of the bodies'
-largest distances from the joint: the nearest points of both surfaces lie on a common normal, and a turn gives
-them equal velocity along it.
+A capsule contains all points within its radius of its axis, a line segment. Only the joints between two bodies
+change the distance between them. If joint j turns at q̇_j, the distance changes at most at |q̇_j| times r, where r
+is the smaller of the bodies' largest distances from the joint: the nearest points of both surfaces lie on a
+common normal, and if both points turned with the joint, their velocities along this normal would be equal.
 """
 
 import math
@@ -105,7 +105,7 @@ def stop_has_room(
 ) -> bool:
     """Return whether all bodies certainly stay more than `least` [m] apart during a stop.
 
-    After each posture checked, time advances by the shortest time in which bodies could come that close.
+    After each checked posture, time advances by the shortest time in which two bodies could come that close.
     """
     n, time = q.shape[0], 0.0
     now, fastest, left = np.empty(n), np.empty(n), np.empty(n)
@@ -148,7 +148,7 @@ def stop_has_room(
 
 @compiled_for_ticks
 def stop_phases(v: float, a: float, limit: float, jerk: float) -> tuple[float, float, float, float, float]:
-    """Return a stop's durations [s] and jerks [rad/s^3]: first phase and its jerk, middle, last and its jerk.
+    """Return durations [s] and jerks [rad/s^3] of a stop: first phase, first jerk, middle phase, last phase, last jerk.
 
     The initial acceleration may exceed its limit.
     """
@@ -172,7 +172,7 @@ def stop_phases(v: float, a: float, limit: float, jerk: float) -> tuple[float, f
 def after(
     v: float, a: float, phases: tuple[float, float, float, float, float], time: float
 ) -> tuple[float, float, float]:
-    """Return turned angle [rad], velocity and acceleration at a time after the start of a stop [s]."""
+    """Return turned angle [rad], velocity and acceleration at `time` [s] after the start of a stop."""
     ramp, first, held, last, jerk = phases
     turned = 0.0
     for phase in range(3):

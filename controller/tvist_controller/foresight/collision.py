@@ -79,13 +79,13 @@ class CollisionModel:
         self.declare(payload)
 
     def meeting(self, q: Floats) -> CloseBodies | None:
-        """Return the closest pair of bodies at a posture if it is below the clearance."""
+        """Return the closest pair of bodies at a posture if their distance is below `CLEARANCE`, else None."""
         gaps = self._gaps(q)
         number = int(np.argmin(gaps)) if len(gaps) else None
         return None if number is None or gaps[number] >= CLEARANCE else self._meeting_of(gaps, number)
 
     def misplaced(self, q: Floats, *payloads: Payload) -> str | None:
-        """Return a message about bodies too close at a posture with any of these payloads, else None."""
+        """Return a message if bodies are too close at a posture with any of these payloads, else None."""
         before = self.declared
         for payload in payloads:
             self.declare(payload)
@@ -97,10 +97,10 @@ class CollisionModel:
         return None
 
     def on_way(self, way: CheckedMotion, *, before: Floats | None = None) -> tuple[float, CloseBodies] | None:
-        """Return the first meeting on a path with its position (share of the path), or None.
+        """Return where bodies first come too close on a path (share of the path), and these bodies; else None.
 
-        Steps are long where all bodies are far apart. Pairs that are too close at the start, or at a posture
-        before it, may separate but not come closer.
+        Steps are long where all bodies are far apart. If a pair is too close at the start, or at the posture
+        `before` the path, it may separate but not come closer.
         """
         travel, share = float(np.abs(way.turned) @ self._reach), 0.0  # at most, of any point [m]
         least = np.minimum(self._gaps(way.at(0.0) if before is None else before), CLEARANCE)
@@ -115,11 +115,11 @@ class CollisionModel:
             share = 1.0 if travel <= 0.0 else min(share + max(nearest - CLEARANCE, SHORT) / travel, 1.0)
 
     def is_spacious(self, q: Floats, turned: Floats) -> bool:
-        """Return whether turning the joints by these angles around a posture certainly avoids meetings."""
+        """Return whether bodies certainly stay apart while the joints turn by up to these angles around a posture."""
         return rooms(*self._parts, q, turned, self._found) > CLEARANCE + BOUND_MARGIN
 
     def stop_is_spacious(self, state: Target, acceleration: float, jerk: float) -> bool:
-        """Return whether a joint stop within these limits certainly avoids meetings."""
+        """Return whether bodies certainly stay apart during a joint stop within these limits."""
         least = CLEARANCE + BOUND_MARGIN
         return stop_has_room(*self._parts, state.q, state.qd, state.qdd, acceleration, jerk, least)
 
@@ -169,7 +169,7 @@ class CollisionModel:
         return row
 
     def _pairs_of(self, description: RobotDescription) -> Floats:
-        """Return the pairs that may meet, without bounds; see `ARMS`."""
+        """Return the pairs of bodies to check; their columns from `ARMS` on are still zero."""
         bodies = len(description.collision.bodies) + 1 if self._names else 0
         apart = {frozenset(pair) for pair in description.collision.apart}
         found = [

@@ -28,10 +28,10 @@ class Stopper:
         self._wanted = math.inf
 
     def foresee(self, tvist: Filter | None = None, trajectory: Trajectory | None = None) -> Floats | None:
-        """Simulate what follows without a command, optionally with another filter or trajectory.
+        """Simulate the motion until rest if no command comes, optionally with another filter or trajectory.
 
-        Returns the last two shaped references played and those until rest, shape (k, n) [rad]; None after
-        more than `MAX_AHEAD` ticks or if the trajectory is stuck. Stops bypass filters.
+        Returns the last two shaped references played, then all until rest, shape (k, n) [rad]; None if rest is
+        more than `MAX_AHEAD` ticks ahead or the trajectory gets stuck. Stops bypass filters.
         """
         ahead = LineSimulation(*self._cycle.fork(tvist, trajectory))
         with suppress(StuckError):
@@ -39,11 +39,11 @@ class Stopper:
         return np.array(ahead.references) if ahead.rests else None
 
     def stop(self, deceleration: float | None) -> StopPlan | None:
-        """Come to rest as quickly as permitted, by default at the deceleration that torque permits.
+        """Come to rest as quickly as permitted; `deceleration` None means the largest that torque permits.
 
         A motion stays on its path, is never ahead of the uninterrupted motion, and rests no later. If no stop
-        within the torque limits does that, it runs out through the filter. A stream, whose path the client
-        defines, stops clear of all bodies. Returns None if a stop in progress is as quick and continues.
+        within the torque limits does that, the motion runs to its end through the filter. A stream has no known
+        path, so it stops clear of all bodies. If a stop in progress is as quick, it continues; returns None.
         """
         cycle, wanted = self._cycle, math.inf if deceleration is None else deceleration
         if cycle.mode in {LineMode.STOPPING, LineMode.RUNNING_OUT} and wanted <= self._wanted:
@@ -59,7 +59,7 @@ class Stopper:
         return plan
 
     def brake(self, trajectory: Trajectory) -> None:
-        """Follow the arm while its brakes stop it; no other stop replaces this."""
+        """Let the reference follow the arm while its brakes stop it; no other stop replaces this trajectory."""
         self._cycle.begin(trajectory, LineMode.STOPPING)
         self._wanted = math.inf  # like a request for the hardest stop
 
@@ -117,7 +117,7 @@ class Stopper:
         return StopPlan(stop, kept, wanted is not None and kept != wanted, max(duration, 0.0), way)
 
     def _shaped(self, forecast: BrakingForecast) -> BrakingForecast:
-        """Return the forecast of a motion behind the filter."""
+        """Return the forecast of the shaped motion, from that of the unshaped motion."""
         cycle = self._cycle
         if cycle.mode is LineMode.STOPPING:
             return forecast

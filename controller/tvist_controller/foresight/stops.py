@@ -31,7 +31,7 @@ MAX_AHEAD = 4000  # largest number of ticks simulated to find the end of a motio
 
 
 class LineSimulation:
-    """A control line without its arm, simulated ahead; it consumes its arguments. A stop has no filter."""
+    """A control line simulated ahead without its arm, by advancing its arguments; `line_filter` is None for a stop."""
 
     def __init__(
         self, trajectory: Trajectory, line_filter: LineFilter | None, shaped: ShapedReference
@@ -44,7 +44,7 @@ class LineSimulation:
         self.rests = False  # whether the last reference is at rest, so that no more follow
 
     def until(self, ticks: int) -> None:
-        """Simulate until this many future references are known or they come to rest."""
+        """Simulate until this many future references are known, or the references come to rest."""
         trajectory, line_filter = self._trajectory, self._line_filter
         while not self.rests and len(self.references) < ticks + 2:
             x = trajectory.next()
@@ -58,7 +58,7 @@ class LineSimulation:
 
     @cached_property
     def last(self) -> int:
-        """Index of the last reference that moved, if they come to rest; 0 if none moved."""
+        """Index of the last reference that moved, provided that the references come to rest; 0 if none moved."""
         return resting_after(np.array(self.references))
 
 
@@ -84,7 +84,7 @@ ROUNDING = 1e-12  # position differences below this are rounding errors [rad]
 class StopPlan:
     """A stop and its limits."""
 
-    trajectory: AnyStop | None  # trajectory of the stop; None if the present motion runs out
+    trajectory: AnyStop | None  # trajectory of the stop; None if the present motion runs to its end
     acceleration: float | None  # acceleration limit of the stop, None for the motion's own [rad/s^2]
     limited: bool  # whether the limit differs from the requested one
     duration: float | None  # time until rest, None if too far ahead [s]
@@ -112,10 +112,10 @@ class StopPlanner:
     ) -> PathStop | None:
         """Return the quickest stop along a motion's path that is certain to be permitted, else None.
 
-        A permitted stop is never ahead of the motion and rests no later. This is certain if it brakes harder,
-        with more jerk, than the motion ever will, or ends before the motion could even at its hardest braking.
-        If the motion is about to rest, no stop qualifies. If the motion lasts long, any stop within the torque
-        limits is permitted, without `certain`.
+        A permitted stop is never ahead of the motion and rests no later. This is certain if the stop brakes
+        harder, and with more jerk, than the motion ever will, or if the stop ends before the motion could end.
+        If the motion is about to rest, no stop qualifies. If `certain` is False, the motion lasts so long that
+        any stop within the torque limits is permitted.
         """
         speed, rise = forecast.path.forwards(state.qd), forecast.path.forwards(state.qdd)
         if (hardest := self._keeping(state, forecast, self.highest)) is None:
@@ -142,7 +142,7 @@ class StopPlanner:
         wanted: float | None,
         asked: Floats | None = None,  # largest torques of the uninterrupted motion, shape (n,) [N m]
     ) -> PathStop | None:
-        """Return the quickest stop along the path of a motion simulated ahead, or None: it must then run out."""
+        """Return the quickest stop along the path of a motion simulated ahead; None if no stop is quicker."""
         newest = ahead.samples[1]
         along: list[float] = []  # distance of the motion at each known tick
 
@@ -163,7 +163,7 @@ class StopPlanner:
         wanted: float | None,
         asked: Floats | None,
     ) -> SlowedStop | None:
-        """Return the quickest `SlowedStop` within the limits of torque and acceleration, else None."""
+        """Return the quickest `SlowedStop` that keeps the limits of torque and acceleration, else None."""
         samples, path = np.array(ahead.samples), forecast.path
         joints = Target(*path.states(state.q, state.qd, state.qdd))
         fastest = float(np.abs(joints.qd).max())
@@ -184,7 +184,7 @@ class StopPlanner:
         return _first(filter(permitted, stops), lambda stop, rebound: torque.holds(stop, rebound=rebound))
 
     def _behind(self, stop: PathStop | SlowedStop, along: Sequence[float]) -> bool:
-        """Return whether a stop is never ahead of a motion whose distance at each tick is known."""
+        """Return whether a stop is never ahead of a motion; `along` is the motion's distance at each tick."""
         shares = (stop.share(number * PERIOD) for number in range(1, len(along) + 1))
         return all(share <= limit + ROUNDING for share, limit in zip(shares, along, strict=True))
 
@@ -226,13 +226,13 @@ class StopPlanner:
         return _first(filter(permitted, stops), lambda stop, rebound: torque.holds(stop, rebound=rebound))
 
     def _keeping(self, state: Target, forecast: BrakingForecast, acceleration: float) -> MotionLimits | None:
-        """Return limits of a stop's parameter that keep all joints within an acceleration and the stops' jerk."""
+        """Return limits of the path's parameter with which a stop keeps every joint's acceleration and jerk limit."""
         speed, rise = abs(forecast.path.forwards(state.qd)), abs(forecast.path.forwards(state.qdd))
         fastest = speed + PERIOD * rise + rise * rise / self.jerk
         return forecast.path.keeping(MotionLimits(fastest, acceleration, self.jerk), fastest, state.q)
 
     def _ladder(self, wanted: float | None) -> Iterator[float]:
-        """Yield trial decelerations: down from the requested one, then up from it."""
+        """Yield trial decelerations: from the requested one down to the gentlest, then harder ones, rising."""
         first = self.highest if wanted is None else min(max(wanted, GENTLEST_STOP), self.highest)
         down = first
         while down > GENTLEST_STOP:
@@ -248,7 +248,7 @@ class StopPlanner:
 
 
 def _first(stops: Iterable[S], holds: Callable[[S, bool], bool]) -> S | None:
-    """Return the first stop that holds with rebound, else the first without; create each once."""
+    """Return the first stop for which `holds(stop, True)`, else the first for which `holds(stop, False)`, else None."""
     made = []
     for stop in stops:
         if holds(stop, True):

@@ -25,7 +25,7 @@ _EMPTY: dict[str, list[Any]] = {"bit": [0] * (BITS // 32), "int": [0] * NUMBERS,
 
 
 def analog_share(value: float, *, voltage: bool) -> float:
-    """Return the fraction of its range for an analogue terminal's value [-]."""
+    """Convert an analogue terminal's voltage or current to a fraction of the terminal's range [-]."""
     low, high = VOLTAGE if voltage else CURRENT
     return (value - low) / (high - low)
 
@@ -96,12 +96,12 @@ class Peripherals:
     # ------------------------------------------------------------------ for programs
 
     def choose(self, terminal: int, *, voltage: bool) -> None:
-        """Make an analogue input (0, 1) or output (2, 3) a voltage or a current; its number or share stays."""
+        """Make an analogue input (0, 1) or output (2, 3) a voltage or a current; its stored number is not converted."""
         self._analog_types = self._analog_types & ~(1 << terminal) | voltage << terminal
         self.changed = True
 
     def choose_tool_input(self, number: int, *, voltage: bool) -> None:
-        """Make an analogue input of the tool a voltage or a current; its signal keeps its number."""
+        """Make an analogue input of the tool a voltage or a current; its stored number is not converted."""
         types = self._tool["tool_analog_input_types"]
         self.set_tool(tool_analog_input_types=types & ~(1 << number) | voltage << number)
 
@@ -131,7 +131,7 @@ class Peripherals:
         values[place] = value
 
     def written(self, bank: Bank, place: int) -> int:
-        """Return the first control period after a client's last write to a register; 0 if never written."""
+        """Return the tick after a client's last write to a register; 0 if no client has written to it."""
         return self._written.get((bank, place), 0)
 
     # ------------------------------------------------------------------ for clients
@@ -189,7 +189,7 @@ class Peripherals:
         )
 
     def _payload_at(self, tick: int, after: Payload) -> Payload:
-        """Return the payload at a tick; all its properties change linearly, as on UR robots."""
+        """Return the payload at a tick; until `after` is reached, all properties change linearly, as on UR robots."""
         if self.payload_change is None:
             return after
         before, ticks, last = self.payload_change

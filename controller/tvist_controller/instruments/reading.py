@@ -62,12 +62,12 @@ class Reading:
 
     @cached_property
     def joint_lists(self) -> bytearray:
-        """Joint lists of the state, see `joint_lists`."""
+        """The state's joint values as bytes, see `wrench.joint_lists`."""
         return joint_lists(self.state)
 
     @cached_property
     def motion(self) -> Floats:
-        """`joint_lists` as an array, shape (10, n)."""
+        """The values of `joint_lists` as an array with one row per quantity, shape (10, n)."""
         return np.ndarray((ROWS, len(self.ratings)), buffer=self.joint_lists)
 
     @cached_property

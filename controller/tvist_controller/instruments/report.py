@@ -88,7 +88,7 @@ class Sink:
     """Whether this sink wants the truth now, even if the robot does not publish it."""
 
     def report(self, report: Report, /) -> None:
-        """Take a tick's report; by default as its state, which takes a while to build."""
+        """Take a tick's report; the default calls `state`, which takes a while to build."""
         self.state(report.state)
 
     def state(self, state: State, /) -> None:
@@ -111,13 +111,13 @@ class Sink:
 
 
 def true_modes(plant: Plant, joints: int) -> dict[str, list[float]]:
-    """Return at most `joints` true modes of the arm (half a tick); empty lists if the plant has none."""
+    """Return at most `joints` true modes of the arm, which takes half a tick; empty lists if the plant has none."""
     modes = plant.modes()
     return {name: [] if modes is None else getattr(modes, name)[:joints].tolist() for name in MODES}
 
 
 def truth_message(plant: Plant, tick: int, modes: dict[str, list[float]]) -> Truth:
-    """Return the message of the truth with true modes; raise ValueError if the plant has none."""
+    """Return the message of the truth with true modes; raise ValueError if the plant provides no truth."""
     truth = truth_of(plant)
     gears, links = truth.static_gear_deflection, truth.static_link_deflection
     return Truth(

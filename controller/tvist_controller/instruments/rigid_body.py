@@ -28,7 +28,7 @@ def cross(a: Sequence[float], b: Sequence[float]) -> list[float]:
 
 
 def carried(omega: list[float], alpha: list[float], arm: list[float]) -> list[float]:
-    """Return the acceleration of a point at r relative to another, α × r + ω × (ω × r) [m/s²]."""
+    """Return the acceleration of a point relative to another, α × r + ω × (ω × r) [m/s²]; `arm` is r."""
     return add(cross(alpha, arm), cross(omega, cross(omega, arm)))
 
 
@@ -44,7 +44,7 @@ def momentum_of(chain: Floats, q: Floats, qd: Floats, bodies: Floats) -> tuple[f
 
 
 class RigidBody:
-    """The arm as the controller models it.
+    """The rigid arm with the declared payload, as the controller models them.
 
     Motions are joint positions [rad], velocities [rad/s] and accelerations [rad/s²], shape (3, n). Offsets
     are the tool centre point in the flange frame: x y z [m] and rotation vector [rad].

@@ -27,14 +27,14 @@ SHAPED_QD, SHAPED_QDD, SHAPED_MOMENT, ACTUAL_Q, ACTUAL_QD, ACTUAL_MOMENT = range
 
 
 def unshaped(state: State) -> tuple[list[float], list[float], list[float]]:
-    """Return q, q̇ and q̈ of the reference before shaping, at the tick of the shaped one."""
+    """Return q, q̇ and q̈ of the reference before shaping, at the tick of the shaped reference in the same state."""
     if state.unshaped_q is None or state.unshaped_qd is None or state.unshaped_qdd is None:
         return state.target_q, state.target_qd, state.target_qdd
     return state.unshaped_q, state.unshaped_qd, state.unshaped_qdd
 
 
 def joint_lists(state: State) -> bytearray:
-    """Return the rows one after the other as doubles in native byte order."""
+    """Return ten joint quantities of a state, row by row, as doubles in native byte order."""
     shaped = state.target_q, state.target_qd, state.target_qdd, state.target_moment
     rows = *unshaped(state), *shaped, state.actual_q, state.actual_qd, state.actual_moment
     return bytearray(pack(f"{ROWS * len(state.target_q)}d", *[value for row in rows for value in row]))
@@ -65,7 +65,7 @@ def product(A: Floats, B: Floats) -> Floats:
 
 @inlined
 def force_at(chain: Floats, q: Floats, torque: Floats, force: Floats) -> None:
-    """Compute the wrench [N, N m] at a chain's end that causes joint torques; see `RigidBody.external`."""
+    """Compute the wrench [N, N m] at a chain's end that causes given joint torques; see `RigidBody.external`."""
     n = q.shape[0]
     J = np.empty((6, n))
     locate(chain, q, np.empty((3, 3)), np.empty(3), J)

@@ -16,17 +16,17 @@ from tvist_plant.model import Floats
 
 FOUND, NO_SOLUTION, OUT_OF_RANGE = 0, 1, 2
 ON_CURVE = 4
-"""Added to these if a joint is free and a curve of postures was searched, which takes many times longer."""
+"""Added to FOUND etc. if a joint is free and a curve of postures was searched, which takes many times longer."""
 
 SAMPLES = 96  # values of a free angle at which postures are computed before the nearest are refined
-SPREAD = (53, 59)  # order of those of the second and third angle; any two angles then fill a square evenly
+SPREAD = (53, 59)  # steps of the second and third free angle; any two angles then fill a square evenly
 
 OUTSIDE = 1e6  # Penalty on the squared distance of a posture outside a joint's range [rad^2]
 
 
 @compiled
 def represent(arm: Floats, near: Floats, q: Floats) -> tuple[float, bool]:
-    """Bring q nearest to `near` by whole turns; return squared distance [rad^2], and whether in range."""
+    """Bring q nearest to `near` by whole turns; return the squared distance [rad^2] and whether q is in range."""
     square, inside = 0.0, True
     for i in range(len(q)):
         q[i] = representation(q[i], near[i], arm[i, 4])
@@ -44,7 +44,7 @@ def all_postures(
     near: Floats,  # joint positions, shape (6,) [rad]
     table: Floats,  # result, shape (8, 6) at least [rad]; rows without posture begin with NaN
 ) -> int:
-    """Compute all postures as `postures` does; if they form a curve, those nearest to `near`."""
+    """Compute all postures as `postures` does; if they form curves, compute the nearest to `near` on each."""
     freedom = postures(arm, rotation, position, (0.0, 0.0, 0.0), table)
     if freedom == FREE:
         _sample_curves(arm, chain, rotation, position, near, table)
@@ -55,7 +55,7 @@ def all_postures(
 def _sample_curves(
     arm: Floats, chain: Floats, rotation: Floats, position: Floats, near: Floats, table: Floats
 ) -> None:
-    """Sample the free angles, then move the nearest posture of each kind along its curve."""
+    """Sample the free angles, then move the nearest posture of each row along its curve towards `near`."""
     sample, least = np.empty((8, 6)), np.empty(8)
     for row in range(8):
         table[row, 0], least[row] = math.nan, math.inf
@@ -89,7 +89,7 @@ def _sample_curves(
 def _start_from_near(
     chain: Floats, rotation: Floats, position: Floats, near: Floats, on_curve: bool, row: Floats
 ) -> None:
-    """Find the posture next to `near`; rounding near singularities moves those of `postures` away."""
+    """Find the posture next to `near` by search: rounding near singularities shifts the results of `postures`."""
     posture = near.copy()
     if descend(chain, rotation, position, near, 0.0, 30, posture) <= ACCURACY:
         if on_curve:
@@ -145,8 +145,8 @@ def search(
 ) -> int:
     """Find postures of any arm by least squares from `near` and other starts; return the nearest's index.
 
-    `found` has two rows per start: the solution, and the nearest to `near` reachable from it at this pose;
-    rows without result begin with NaN. Return -1 if no posture is within the joints' ranges.
+    `found` has two rows per start: the solution, and the posture nearest to `near` after moving from the solution
+    at constant pose. Rows without result begin with NaN. Return -1 if no posture is within the joints' ranges.
     """
     best, least = -1, math.inf
     for start in range(len(starts) + 1):
@@ -172,7 +172,7 @@ STARTS = 63  # number of further start postures for an arm without closed form
 
 
 class InverseKinematicsError(ValueError):
-    """No joint positions reach the pose, or only some outside a joint's range, which ends at `limit` [rad]."""
+    """No joint positions reach the pose, or only positions beyond the limit of a joint, `limit` [rad]."""
 
     def __init__(self, message: str, limit: float | None = None) -> None:
         super().__init__(message)
@@ -225,7 +225,7 @@ class InverseKinematics:
         raise self._error(found[np.argmin(np.linalg.norm(found - near, axis=1))] if len(found) else None)
 
     def _error(self, q: Floats | None) -> InverseKinematicsError:
-        """Return the error for no posture, or for the joint farthest outside its range."""
+        """Return the error: no posture reaches the pose (q is None), or a joint would be outside its range."""
         if q is None:
             return InverseKinematicsError("no joint positions reach this pose")
         joint = int(np.argmax(np.abs(q) - self._limits))

@@ -68,7 +68,7 @@ def rotation_vector(rotation: Floats) -> list[float]:
 
 
 def turn(start: Floats, end: Floats) -> Floats:
-    """Return the shortest rotation vector in the base frame from one orientation to another."""
+    """Return the rotation vector, in the base frame, of the shortest turn from one orientation to another."""
     vector = np.empty(3)
     turned_by(np.ascontiguousarray(end @ start.T), vector)
     return vector
@@ -118,7 +118,7 @@ def pose_error(
 
 @compiled
 def pseudo_inverse(jacobian: Floats, inverse: Floats) -> None:  # noqa: C901, PLR0912  a kernel: its branches are loops
-    """Compute the pseudo-inverse (n, 6) of a Jacobian without lost directions (Hestenes, 1958).
+    """Compute the pseudo-inverse (n, 6) of a Jacobian; it is zero in lost directions (Hestenes, 1958).
 
     Not numba's own decomposition, because that needs scipy, which a served robot does without.
     """
@@ -197,13 +197,13 @@ class Placement(NamedTuple):
 
     @property
     def inverse(self) -> "Placement":
-        """Pose of the reference in this frame."""
+        """The inverse pose: of this pose's reference frame in its own frame."""
         back = self.rotation.T
         return Placement(back, -back @ self.position)
 
     @property
     def vector(self) -> tuple[float, float, float, float, float, float]:
-        """X y z [m] and rotation vector [rad]."""
+        """Position x y z [m] and rotation vector [rad]."""
         return placement_vector(*self)
 
 

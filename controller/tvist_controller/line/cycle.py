@@ -24,7 +24,7 @@ T = TypeVar("T", bound=Trajectory)
 
 
 class ControlCycle:
-    """Trajectory generator, TVIST filter, differentiator, inverse dynamics, joint controllers, plant.
+    """The control line: trajectory generator, filter, differentiator, inverse dynamics, joint controllers, plant.
 
     Raise ValueError if the plant cannot start at q, or its measurement has the wrong shape.
     """
@@ -84,7 +84,7 @@ class ControlCycle:
         return self.sample
 
     def _to_drives(self, reference: Floats) -> Floats:
-        """Return signals from the shaped reference to the drives, and the last reference, shape (9, n)."""
+        """Return a tick's signals from the shaped reference to the drives, see `SIGNALS`, shape (9, n)."""
         signals, dynamics = np.empty((SIGNALS, len(reference))), self.dynamics
         before, middle, last = self.shaped.joints.window
         parts = dynamics.chain, dynamics.scratch, self.drives.rows
@@ -102,7 +102,7 @@ class ControlCycle:
         return self.sample
 
     def _references(self) -> tuple[Floats, Floats, Obstacle | None]:
-        """Return reference, shaped reference, and the reason for a stop that had to begin, else None."""
+        """Return reference, shaped reference and, if a stop had to begin, its reason, else None."""
         guard = self.guard
         try:
             x = self.trajectory.next()
@@ -122,10 +122,10 @@ class ControlCycle:
         return x, x, guard.obstacle
 
     def begin(self, trajectory: T, mode: LineMode = LineMode.SHAPED, guard: Guard | None = None) -> T:
-        """Follow a trajectory from now on, with another guard if given.
+        """Follow a trajectory from now on, with the present guard unless another is given.
 
-        In a shaped mode the trajectory continues the reference x, otherwise the shaped reference x*, and the
-        delay line is discarded. A new path can begin only at rest.
+        In a shaped mode the trajectory continues the reference x. In other modes it continues the shaped
+        reference x*, and the delay line is discarded. A new path can begin only at rest.
 
         Raises:
             ValueError: The mode cannot follow the present one, or needs a guard and has none.
@@ -152,8 +152,8 @@ class ControlCycle:
     def use(self, tvist: Filter, elastic: ElasticFeedForward | None = None) -> None:
         """Change the filter: at once if at rest, otherwise within the limits of the motion.
 
-        During a change the new filter waits; only the latest waiting filter is kept. Without elastic
-        feed-forward, the paper's is used.
+        While an earlier change is in progress, the new filter waits; only the latest waiting filter is kept. If
+        `elastic` is None, the paper's feed-forward is used.
         """
         self.drives.wanted = elastic
         if self.mode.at_rest:  # both kinds of feed-forward are equal at rest: no fading
@@ -196,12 +196,12 @@ class ControlCycle:
 
     @property
     def along(self) -> Differentiator:
-        """State of the filter's samples: path parameters or joint positions."""
+        """Newest filter output and its derivatives: path parameters or joint positions."""
         return self.shaped.along
 
     @property
     def stands_still(self) -> bool:
-        """Whether the shaped reference rests on a standing reference: the motion is over or paused."""
+        """Whether the shaped reference rests at a reference that stands still: the motion is over or paused."""
         sample = self.sample
         return (
             self.trajectory.standing
@@ -228,8 +228,8 @@ class ControlCycle:
     ) -> Sample:
         """Place the arm at rest in static equilibrium, perhaps with another payload, and restart the whole line.
 
-        An arm that cannot be placed stays where it is; if that is unknown, raise ValueError before any change.
-        The line of one that does not answer starts at its last measurements, `measured`.
+        An arm that cannot be placed stays where it is; if its position is unknown, raise ValueError before any change.
+        If the arm does not answer, pass its last measurements as `measured`; the line starts there.
         """
         plant = self.plant
         if measured is None and not isinstance(plant, SimulatedArm):

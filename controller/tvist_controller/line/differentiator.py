@@ -33,9 +33,9 @@ def rests_at(reference: Floats, target: Target) -> bool:
 
 
 def central_differences(references: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return positions, velocities and accelerations of references (k + 2, n), equal to `Differentiator`.
+    """Return positions, velocities and accelerations of references (k + 2, n), equal to those of `Differentiator`.
 
-    They are those of all but the first and last reference, each of shape (k, n).
+    The first and last reference have no result, so each result has shape (k, n).
     """
     qd: Floats = (references[2:] - references[:-2]) / (2.0 * PERIOD)
     qdd: Floats = np.diff(references, 2, axis=0) / PERIOD**2
@@ -100,11 +100,11 @@ class Differentiator:
 
     @property
     def newest(self) -> Target:
-        """State at the newest reference; a motion continued from it starts with the same acceleration."""
+        """State at the newest reference. A motion that continues from this state starts with the same acceleration."""
         return self._state(*self.window)
 
     def after(self, q: Floats) -> Target:
-        """Return the value of `newest` after this next reference."""
+        """Return the value that `newest` would have if q were the next reference."""
         return self._state(self.window[1], self.window[2], q)
 
     def _state(self, before: Floats, middle: Floats, last: Floats) -> Target:
@@ -114,7 +114,7 @@ class Differentiator:
 
 
 class ShapedReference:
-    """Converts filter samples (joint positions or a path's parameter) to targets, from rest."""
+    """Converts filter samples (joint positions or a path's parameter) to targets; starts at rest."""
 
     def __init__(self, q: Floats) -> None:
         self.joints = Differentiator(q)  # state of the joints
@@ -135,14 +135,14 @@ class ShapedReference:
         """State of the samples; without a path, of the joints."""
 
     def take(self, x: Floats, x_star: Floats) -> Floats:
-        """Take this tick's samples, equal objects without a filter; return the unshaped joint positions."""
+        """Take samples before and after the filter (without filter, one object); return unshaped joint positions."""
         q, q_star, posture_of = x, x_star, self.posture_of
         if posture_of is not None:
             q = posture_of(x)
             q_star = q if x_star is x else posture_of(x_star)
             self.along.push(x_star)
         self.joints.push(q_star)
-        if x_star is x:  # what bypasses the filter continues the shaped reference: the reference may jump
+        if x_star is x:  # without filter, samples continue the shaped reference, so the unshaped one may jump
             self.references = self.joints.window
         else:
             _, middle, last = self.references

@@ -14,10 +14,10 @@ FADE = 150  # duration of the transition in motion [ticks]
 
 
 class DriveFeedForward:
-    """The paper's feed-forward, or that of an elastic arm while a shaper uses it.
+    """The paper's feed-forward, or elastic feed-forward while a shaper uses that.
 
-    Their commands belong to different ticks and contain different shares of wind-up, so one fades into the
-    other in motion; at rest they are equal. For `compensate_sag` and `positions` see `joint_rows`.
+    Commands of the two kinds belong to different ticks and contain different shares of wind-up, so in motion one
+    kind fades into the other; at rest they are equal. For `compensate_sag` and `positions` see `joint_rows`.
     """
 
     def __init__(
@@ -42,7 +42,7 @@ class DriveFeedForward:
 
     @property
     def delay(self) -> float:
-        """Delay of commands behind the paper's targets [s]."""
+        """Delay of commands behind those of the paper's feed-forward [s]."""
         return 0.0 if self.wanted is None else self.wanted.delay
 
     def _rely_on_law(self) -> None:
@@ -51,7 +51,7 @@ class DriveFeedForward:
             self.rows[LAW : LAW + len(self.law)] = self.law
 
     def rest(self) -> None:
-        """Complete a transition at once if no motor leads its joint: both kinds of feed-forward are then equal."""
+        """If no motor leads its joint, complete a transition at once: both kinds of feed-forward are then equal."""
         self._rely_on_law()
         if self._elastic is self.wanted and self._share == self._full:
             return
@@ -76,8 +76,8 @@ class DriveFeedForward:
     ) -> DriveCommand:
         """Return the drive command for a target.
 
-        Elastic feed-forward needs a smooth reference to begin (`may_begin`) or continue (`may_go_on`). A stop is smooth
-        enough to continue; an unshaped guided motion may jump in acceleration, which motors cannot lead.
+        `may_begin`, `may_go_on`: the reference is smooth enough to begin or continue elastic feed-forward. A stop is
+        smooth enough to continue it. An unshaped guided motion may jump in acceleration, which motors cannot lead.
         """
         if self._elastic is not None or self.wanted is not None:
             self._fade(may_begin if self._share == 0 else may_go_on)
@@ -104,7 +104,7 @@ class DriveFeedForward:
             self._elastic.reset(self.rows[STICTION])
 
     def _fade(self, smooth: bool) -> None:
-        """Advance the transition by a tick; complete one before reversing it."""
+        """Advance the transition by a tick; a transition is completed before the reverse one begins."""
         if self._share == 0 and self._elastic is not self.wanted:
             self._begin()
         rises = smooth and self._elastic is not None and self._elastic is self.wanted

@@ -93,7 +93,7 @@ class ElasticFeedForward:
 
     @property
     def settled(self) -> bool:
-        """Whether the motors have not led for some ticks."""
+        """Whether the motors' lead over the joints has been zero for some ticks."""
         return self._ticks == 0 or float(np.abs(self.lead.leads[1]).max()) < SETTLED
 
     def command(

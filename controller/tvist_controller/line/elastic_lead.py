@@ -1,4 +1,4 @@
-"""Lead of the motors that keeps an elastic arm on its target, and the resulting commands, compiled.
+"""Kernels: the lead of the motors that keeps an elastic arm's flange on target, and the resulting commands.
 
 A gear with load τ (without gravity) twists by τ/K_g, and a bending link by φ = -τ_f/k_b. Both lag by the damping time
 D/K, a fraction of a tick. The joints must turn by the twist, and by what returns the flange to its place:
@@ -93,7 +93,7 @@ def parts(memory: Floats) -> Lead:
 
 @compiled_for_ticks
 def move_back(lead: Lead, moved: Floats, back: Floats) -> None:
-    """Compute the joint turns that move the flange, J_jᵀ (J_j J_jᵀ + λ² E)⁻¹ moved; overwrite `moved`."""
+    """Compute the joint turns that move the flange by `moved`: J_jᵀ (J_j J_jᵀ + λ² E)⁻¹ moved; overwrite `moved`."""
     n = lead.joints.shape[0]
     square = np.zeros((3, 3))
     for row in range(3):
@@ -111,7 +111,7 @@ def move_back(lead: Lead, moved: Floats, back: Floats) -> None:
 
 @inlined
 def bending_accelerations(lead: Lead, period: float, found: Floats) -> None:
-    """Compute accelerations of bending and compensating joints, one tick late as second differences, (N,)."""
+    """Compute accelerations of bending and compensating joints, as second differences one tick late, (N,)."""
     bent, moved, back = lead.bent, np.zeros(3), np.empty(lead.joints.shape[0])
     for k in range(lead.flexes.shape[0]):
         c = int(lead.flexes[k])
@@ -165,7 +165,7 @@ def lead_of(  # noqa: C901  a kernel: its branches are loops
     lead: Lead,  # its wanted leads are moved on by one
     target: Floats,  # q, q̇ and q̈, and τ* of the rigid arm, shape (4, n)
     first: bool,  # whether there was no tick before
-    smooth: bool,  # so that second differences say how bending links accelerate
+    smooth: bool,  # whether second differences give the accelerations of bending links
     memory: Floats,
     needed: Floats,  # result, shape (n,) [N m]
 ) -> None:
@@ -214,7 +214,7 @@ def follow(
     room: Floats,  # largest acceleration of each joint's lead, shape (n,) [rad/s^2]
     period: float,
 ) -> bool:
-    """Advance the actual lead, critically damped after a limit; return whether acceleration was limited."""
+    """Advance the actual lead; after a limitation it returns critically damped. Return whether it was limited now."""
     limited = False
     for j in range(led.shape[1]):
         now, before = led[0, j], led[1, j]
@@ -238,7 +238,7 @@ def command_motors(  # noqa: C901, PLR0912  a kernel: its branches are loops
     smooth: bool,
     motors: Floats,  # result: positions, velocities, accelerations and torques of the motors, shape (4, n)
 ) -> bool:
-    """Compute a target's lead and the previous target's commands; return whether it was limited."""
+    """Compute a target's lead and the previous target's commands; return whether the lead was limited."""
     lead, period, with_torques = parts(memory), memory[PERIOD], memory[WITH_TORQUES] > 0.0
     n, late, drives, wanted, led = target.shape[1], lead.late, lead.drives, lead.leads[0], lead.leads[1]
     needed, limited = np.empty(n), False

@@ -34,7 +34,7 @@ def arm_limits(description: RobotDescription) -> MotionLimits:
 
 
 def rate_of(speed: float, velocity: float, slowest: float | None) -> float:
-    """Return a motion's time rate [-]; `slowest` is the velocity limit of reduced mode, if active."""
+    """Return the time rate [-] of a motion with this largest velocity; `slowest` is reduced mode's limit, if active."""
     return speed if slowest is None else min(speed, slowest / velocity)
 
 
@@ -51,9 +51,9 @@ def keeps_torque(chain: Floats, q: Floats, qd: Floats, qdd: Floats, scratch: Flo
 
 @compiled_for_ticks
 def torque_room(chain: Floats, q: Floats, qd: Floats, scratch: Floats, most: Floats, share: float) -> float:
-    """Return the largest acceleration of all joints at once, any directions, within torques `most` [N m].
+    """Return the acceleration that all joints may have at once, in any directions, within torques `most` [N m].
 
-    Torque of the acceleration counts by the factor `share`; other arguments as `tvist_plant.chain.torques`.
+    The torque due to acceleration is multiplied by `share`; other arguments as in `tvist_plant.chain.torques`.
     """
     n, least = q.shape[0], math.inf
     found, M = np.zeros(n), np.empty((n, n))
@@ -70,8 +70,8 @@ def torque_room(chain: Floats, q: Floats, qd: Floats, scratch: Floats, most: Flo
 class StreamTorqueMargin:
     """Acceleration of a stream or guided motion within the joint torques left by gravity and velocity.
 
-    A guided motion may change suddenly, as no filter smooths it. The flexible arm's torque then overshoots by
-    the fraction `rebound`, and must also stay within the limits.
+    An unshaped guided motion may change suddenly. The torque of the flexible arm then overshoots that of the rigid
+    arm by the fraction `rebound`, and must also stay within the limits.
     """
 
     def __init__(
@@ -82,7 +82,7 @@ class StreamTorqueMargin:
         self._dynamics = dynamics
 
     def allows(self, q: Floats, qd: Floats, qdd: Floats) -> bool:
-        """Return whether a state keeps all torques, or is as gentle as any stop."""
+        """Return whether a state keeps all torque limits, or has at most the acceleration of the gentlest stop."""
         swung = (1.0 + self._rebound) * qdd
         keeps = self._keeps(q, qd, qdd, self._most) and (
             self._rebound == 0.0 or self._keeps(q, qd, swung, self._limits)
@@ -92,7 +92,7 @@ class StreamTorqueMargin:
     def acceleration(self, q: Floats, qd: Floats) -> float:
         """Return the largest a such that every |q̈ᵢ| ≤ a is allowed, at least `GENTLEST_STOP` [rad/s^2].
 
-        With τ = M q̈ + h, such a q̈ needs at most |hᵢ| + a Σⱼ|Mᵢⱼ| at joint i.
+        With τ = M q̈ + h, any q̈ with |q̈ᵢ| ≤ a needs at most the torque |hᵢ| + a Σⱼ|Mᵢⱼ| at joint i.
         """
         room = self._room(q, qd, self._most, 1.0)
         if self._rebound > 0.0:
@@ -116,8 +116,8 @@ class StreamTorqueMargin:
 class StopTorque:
     """Joint torques available to a stop from a state.
 
-    The rigid arm's torques stay within their share of the limits, or, if larger, within those of the
-    uninterrupted motion (`asked`, by default the torque at the start).
+    The rigid arm's torques stay within a share of the limits. If the uninterrupted motion needs more (`asked`, by
+    default the torque at the start), they stay within that instead.
     """
 
     def __init__(
@@ -133,9 +133,9 @@ class StopTorque:
     def holds(self, stop: AnyStop, *, rebound: bool = True) -> bool:
         """Return whether a stop keeps these torques and, with `rebound`, its overshoot keeps the limits.
 
-        Torque peaks where a joint's acceleration ramp ends, hence 32 moments. Nine in ten failing stops fail
-        at the end of the whole stop's ramp; the next stop mostly fails where the last one did. These two
-        moments are checked first.
+        Torque peaks where a joint's acceleration ramp ends, so 32 moments are checked. Two come first: the end of the
+        ramp to the full deceleration, where nine in ten failing stops fail; and the moment at which the previous stop
+        failed, since the next one mostly fails there, too.
         """
         ramp = stop.acceleration / stop.jerk
         ends = min(math.ceil(ramp / stop.duration * MOMENTS), MOMENTS) if stop.duration > 0.0 else MOMENTS
@@ -171,8 +171,8 @@ def acceleration_on_way(
 ) -> float:
     """Return the largest acceleration of a path's parameter that keeps torques within their share [rad/s^2].
 
-    Along q(x) the torque is m(x) ẍ + c(x) ẋ² + g(x), largest at a corner of the range of ẋ² and ẍ. It is
-    checked at 17 points of a way from `start`, both of shape (m,); `limits` are the joints' torque limits.
+    Along q(x) the torque is m(x) ẍ + c(x) ẋ² + g(x), which is largest at a corner of the range of ẋ² and ẍ. This
+    is checked at 17 points of `way` from `start`, both of shape (m,); `limits` are the joints' torque limits.
     """
     farthest, x = float(np.abs(way).max()), start + _POINTS * way
     still = np.zeros_like(x)
@@ -184,7 +184,7 @@ def acceleration_on_way(
 
 
 def torque_along(dynamics: InverseDynamics, references: Floats) -> Floats:
-    """Return the largest torques along references (k >= 3, n) [rad] by central differences, (n,) [N m]."""
+    """Return each joint's largest torque along references (k >= 3, n) [rad], by central differences, (n,) [N m]."""
     q, qd, qdd = central_differences(references)
     looked = np.append(np.arange(0, len(q) - 1, LOOK_EVERY), len(q) - 1)
     states = zip(q[looked], qd[looked], qdd[looked], strict=True)

@@ -12,7 +12,7 @@ from tvist_shaping.fade import Fade
 
 
 class LineFilter:
-    """Shapes with the latest chosen filter; in motion, the previous one fades into it."""
+    """Shapes with the latest chosen filter; in motion, the previous filter fades into the new one."""
 
     def __init__(self, tvist: Filter, arm: MotionLimits) -> None:
         self.tvist = tvist  # the latest chosen filter, in use or next
@@ -27,7 +27,7 @@ class LineFilter:
 
     @property
     def settled(self) -> bool:
-        """Whether the output stays at the reference; with negative weights echoes may cancel momentarily."""
+        """Whether the output stays at the reference, not just momentarily as negative weights allow."""
         return self._fade is None and (self.tvist.peak == 1.0 or self.tvist.settled)
 
     @property
@@ -41,12 +41,12 @@ class LineFilter:
 
     @property
     def peak(self) -> float:
-        """Ratio of shaped to reference acceleration at most, see `Filter.peak`."""
+        """Largest ratio of shaped to unshaped acceleration, see `Filter.peak`."""
         fade = self._fade
         return self.tvist.peak if fade is None else max(self.tvist.peak, fade.old.peak, fade.new.peak)
 
     def reduced_limits(self, limits: MotionLimits | None = None) -> MotionLimits:
-        """Return limits of a reference such that the shaped one keeps the arm's limits and the given ones."""
+        """Return limits for the reference with which the shaped reference keeps the arm's limits and the given ones."""
         arm, (faster, harder) = self._arm, (1.0 + more for more in self.tvist.surplus)
         limits = arm if limits is None else limits
         return MotionLimits(
@@ -56,20 +56,20 @@ class LineFilter:
         )
 
     def filter(self, reference: Floats) -> Floats:
-        """Return the shaped sample, also within a transition."""
+        """Return the shaped sample; during a transition, a mixture of both filters' outputs."""
         if (fade := self._fade) is None:
             return self.tvist.filter(reference)
         shaped = fade.filter(reference)
         if (
             fade.new is not self.tvist
-        ):  # it waits for the present transition to end, and must know the references
+        ):  # the latest filter waits for the end of the present transition, and needs the past references
             self.tvist.filter(reference)
         if fade.finished:
             self._fade = None if fade.new is self.tvist else self._fade_to(fade.new, self.tvist)
         return shaped
 
     def use(self, tvist: Filter) -> None:
-        """Change the filter within the limits of the motion; during a transition, the latest one waits."""
+        """Change the filter within the limits of the motion; during a transition, the new filter waits."""
         fade = self._fade
         if fade is None or fade.share == 0.0:
             self._fade = self._fade_to(self.tvist if fade is None else fade.old, tvist)
@@ -78,7 +78,7 @@ class LineFilter:
         self.tvist = tvist
 
     def cut(self) -> None:
-        """Drop the transition for a bypass; the filter restarts from rest."""
+        """End a transition at once because references bypass the filter; the filter restarts from rest."""
         self._fade = None
 
     def begin(self, tvist: Filter, sample: Floats, posture_of: Posture | None = None) -> None:

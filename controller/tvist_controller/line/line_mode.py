@@ -1,4 +1,4 @@
-"""Modes of the control line as a table: active parts, and permitted next modes; and the guard of some."""
+"""Modes of the control line as a table (active parts, permitted next modes), and the guard that some modes need."""
 
 from enum import Enum
 from typing import NamedTuple, Protocol
@@ -9,7 +9,7 @@ from tvist_protocol.replies import Code
 
 
 class LineMode(Enum):
-    """Mode of the control line; a row has `shaped`, `guarded`, and the permitted next modes."""
+    """Mode of the control line; a member's values are `shaped`, `guarded`, and the permitted next modes."""
 
     REST = (True, False, "REST", "SHAPED", "GUARDED", "BYPASSED")  # the shaped reference rests
     SHAPED = (True, False, "REST", "SHAPED", "BYPASSED", "RUNNING_OUT", "STOPPING")  # a shaped planned motion
@@ -29,7 +29,7 @@ class LineMode(Enum):
 
 
 def check_change(before: LineMode, after: LineMode, *, guarded: bool) -> None:
-    """Raise ValueError if the table lacks this change, or the mode needs a guard and has none."""
+    """Raise ValueError if the table forbids this change, or if the new mode needs a guard and has none."""
     if after.name not in before.followed_by:
         raise ValueError(f"the line cannot change from {before.name} to {after.name}")
     if after.guarded and not guarded:

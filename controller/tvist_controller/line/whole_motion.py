@@ -1,4 +1,4 @@
-"""Whole motions at once, block by block, equal to `ControlCycle` to the last bit, since no block depends on the arm."""
+"""Whole motions at once, block by block. No block depends on the arm, so results equal `ControlCycle`'s to the bit."""
 
 from dataclasses import dataclass
 
@@ -67,7 +67,7 @@ class DrivenLine:
         return Driven(rest, targets, commands, drives.delay)
 
     def _tick(self, before: Floats, middle: Floats, last: Floats) -> tuple[Floats, DriveCommand]:
-        """Return the target of three shaped references, shape (3, n), and the command for it."""
+        """Return the target in the middle of three shaped references, shape (3, n), and its drive command."""
         signals = np.empty((SIGNALS, len(last)))
         to_drives(before, middle, last, last, PERIOD, *self._parts, signals)
         return signals[Q:TORQUE], self._drives.command(signals, self._dynamics.payload_parameters)

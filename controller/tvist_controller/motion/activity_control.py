@@ -82,7 +82,7 @@ class MotionControl:
         return self.streams.stream is not None
 
     def snapshot(self, filter_now: FilterState, script: Script | None, time: float | None) -> PlanningState:
-        """Return the state that plans depend on, from rest, or of a motion to be extended in `time` [s]."""
+        """Return the state for plans from rest or, if `time` [s] is given, for an extension of the motion after it."""
         cycle = self.cycle
         tvist = cycle.tvist
         now = PlanningState(
@@ -120,7 +120,7 @@ class MotionControl:
         return self.motions.begin(planned)
 
     def pause(self) -> None:
-        """Pause the motion on its path, or let it end if it is about to; raise RefusalError if none runs."""
+        """Pause the motion on its path, unless the motion is about to end; raise RefusalError if none runs."""
         self.go("pause")
         if (move := self.motions.move) is not None:
             move.hold()
@@ -145,7 +145,7 @@ class MotionControl:
 
     @property
     def ready(self) -> bool:
-        """Whether the drives hold the arm, as they always do with simulated arms."""
+        """Whether the drives hold the arm; always true for simulated arms."""
         return self.power is None or self.power.condition.ready
 
     def protect(self, why: str, code: Code | None = None) -> None:
@@ -167,7 +167,7 @@ class MotionControl:
         self.activity = self.check(trigger)
 
     def follow(self, period: float, limits: MotionLimits, now: float) -> None:
-        """Start to follow set-points; raise RefusalError if busy or above the reduced velocity limit."""
+        """Start to follow set-points; raise RefusalError if busy, or if `limits` exceed the reduced velocity limit."""
         target = self.check("servo_start")
         if (most := self.motions.slowest) is not None and limits.velocity > most:
             must = f"at most {most:.3g} rad/s while safety_mode is REDUCED"
@@ -201,11 +201,11 @@ class MotionControl:
         self._end_stream("servo_stop")
 
     def stop(self, deceleration: float | None, why: str, code: Code | None = None) -> None:
-        """Stop without the filter at up to a deceleration [rad/s^2], and report how the motion ended."""
+        """Stop without the filter, at most at a deceleration [rad/s^2], and report how the motion ended."""
         self.end("stop", why, code, deceleration)
 
     def interrupt(self, why: str, code: Code | None = None) -> None:
-        """End motion that must not continue, as `stop`."""
+        """End motion that must not continue, as `stop` does."""
         self.end("interruption", why, code)
 
     def end(
@@ -218,7 +218,7 @@ class MotionControl:
         kind: EventKind | None = None,
         category: int = 2,
     ) -> None:
-        """Carry out a trigger's transition, if any, and stop motion; an event of `kind` reports the stop."""
+        """If the trigger has a transition now, carry it out and stop motion; report the stop by an event of `kind`."""
         if (target := after(self.activity, trigger)) is None:
             return
         self.activity = target
@@ -239,7 +239,7 @@ class MotionControl:
         kind: EventKind | None = None,
         category: int = 2,
     ) -> None:
-        """Report a stop and the motion it ended; `plan` is None if the line already stops."""
+        """Report a stop and the motion that it ends; `plan` is None if the line is at rest or already stopping."""
         if kind is None and not self.motions.running and not self.streaming:
             return
         duration, way = (0.0, 0.0) if self.cycle.mode.at_rest else self.ahead.until_rest(plan)
@@ -250,7 +250,7 @@ class MotionControl:
         self.motions.stopped(why, code, **told)
 
     def abandon(self, why: str, code: Code | None = None) -> None:
-        """Report that the present motion ended because the arm is placed elsewhere."""
+        """Report that the present motion has ended without a stop, as when the arm is placed elsewhere."""
         self._end_stream(why, code)
         self.motions.stopped(why, code)
 
@@ -260,7 +260,7 @@ class MotionControl:
             self.interrupt(silence)
 
     def step(self, wrench: Floats | None = None) -> Sample:
-        """Compute one tick of the line; see `ControlCycle.step`. After a PlantError, call `recover`."""
+        """Compute one tick of the line; see `ControlCycle.step`. After a PlantError, call `SafetyControl.recover`."""
         if self.power is not None:
             self.power.follow(self.robot_mode)
         sample = self.cycle.step(wrench)

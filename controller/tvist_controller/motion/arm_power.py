@@ -12,7 +12,7 @@ STALE = 10  # ticks without a new timestamp after which measurements are stale
 
 
 class ArmPower:
-    """Passes power and brake states to a plant, and its condition to the robot."""
+    """Sets power and brakes of a plant, and reports the plant's condition to the robot."""
 
     def __init__(self, plant: Plant) -> None:
         self._plant = plant
@@ -26,7 +26,7 @@ class ArmPower:
 
     @classmethod
     def of(cls, plant: Plant) -> Self | None:
-        """Return the power of a plant; None for a simulated arm without `switch` and `stop`."""
+        """Return a plant's power control; None for a simulated arm without `switch` and `stop`."""
         needs_nothing = isinstance(plant, SimulatedArm) and not (
             plant.can(Plant.switch) or plant.can(Plant.stop)
         )
@@ -34,14 +34,14 @@ class ArmPower:
 
     @property
     def condition(self) -> Condition:
-        """Present condition of the plant; a fault if it does not answer."""
+        """Present condition of the plant; if the plant does not answer, a condition with a fault."""
         try:
             return self._plant.condition
         except PlantError as error:
             return Condition(ready=False, fault=str(error))
 
     def follow(self, mode: RobotMode) -> None:
-        """Switch power and brakes after a mode change; off while the arm's own controller has stopped it."""
+        """Switch power and brakes after a mode change; power stays off while the arm's own controller stops the arm."""
         if self.halted is not None:
             mode = RobotMode.POWER_OFF
         if mode is self._told:

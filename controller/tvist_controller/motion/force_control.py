@@ -41,7 +41,7 @@ SILENT = 0.1  # time without values after which the sensor counts as silent [s]
 
 
 class ContactWatch:
-    """Records the force at the tool from the first query on, and finds the start of a contact."""
+    """Finds the start of a contact in the force at the tool, which is recorded from the first query on."""
 
     def __init__(self) -> None:
         self._forces = deque[Floats](maxlen=REMEMBERED)
@@ -78,7 +78,7 @@ class ContactWatch:
 
 
 class ExternalSensor:
-    """Replaces the arm's sensor while in use and not silent; in lockstep it never counts as silent."""
+    """A sensor that replaces the arm's own while in use and not silent; in lockstep it never counts as silent."""
 
     def __init__(self, *, timeouts: bool) -> None:
         self._most = round(SILENT / PERIOD) if timeouts else np.inf
@@ -108,7 +108,7 @@ class ExternalSensor:
         return self._offset is not None and self.latest is None
 
     def next(self) -> Floats | None:
-        """Return `felt` for the next tick; call in each while there is a `latest` value."""
+        """Return `felt` for the next tick; call once per tick while there is a `latest` value."""
         self._age += 1
         if self._age > self._most:
             self.latest = None
@@ -116,7 +116,7 @@ class ExternalSensor:
 
 
 class ForceControl(Monitor):
-    """Starts and ends force mode, and monitors its limits; without `timeouts`, no sensor counts as silent."""
+    """Starts, ends and monitors force mode and freedrive; without `timeouts`, the sensor never counts as silent."""
 
     def __init__(self, guidance: Guidance, forces: ToolForces, *, timeouts: bool) -> None:
         self._guidance, self._forces = guidance, forces
@@ -136,15 +136,15 @@ class ForceControl(Monitor):
 
     @property
     def hindrance(self) -> int:
-        """Freedrive: 0 if free, 1 near a singular posture, 2 if that nearly blocks the arm."""
+        """Freedrive near a singular posture: 0 if not hindered, 1 if slowed down, 2 if nearly blocked."""
         share = 1.0 if not self.by_hand or (lead := self._guidance.compliant) is None else lead.hindered
         return 0 if share == 1.0 else 1 if share > CRAWL else 2
 
     def begin(self, task: ForceTask, feature: Feature, kind: int, trigger: str = "force_mode") -> int:
         """Start or change force control with trigger `force_mode` or `freedrive`; return the motion's number.
 
-        A running guided motion continues in the other axes. `feature` is the task's frame, `kind` 1 to 3 as
-        in `frame_of`. Raise RefusalError if the activity or its motion does not allow it.
+        A running guided motion continues in the other axes. `feature` is the task's frame; `kind`, 1 to 3, is
+        explained in `frame_of`. Raise RefusalError if the present activity or motion does not allow force control.
         """
         if self._cycle.plant.supervised:
             raise wrong_mode(
@@ -159,14 +159,14 @@ class ForceControl(Monitor):
         return self._guidance.follow(trigger, lead)
 
     def free(self, axes: Floats, feature: Feature) -> int:
-        """Start freedrive along and about the axes that are 1, shape (6,); else as `begin`."""
+        """Start freedrive in the axes of the feature whose entry is 1, shape (6,); see `begin`."""
         mass, damping = HEAVY if self._cycle.sample.wrench is None else LIGHT
         speeds = np.where(axes > 0.0, HAND_SPEED, np.inf)
         task = ForceTask(axes, np.zeros(6), speeds, (damping / FREE_DAMPING) ** 4, 1.0, mass, damping)
         return self.begin(task, feature, 2, "freedrive")
 
     def end(self) -> None:
-        """End force mode, if on, and any motion in the other axes; come to rest."""
+        """End force mode and the motion in the other axes, if any; the arm comes to rest."""
         if self._guidance.compliant is not None:
             self._guidance.stop_joints(GENTLE, "end_force_mode")
 
@@ -178,7 +178,7 @@ class ForceControl(Monitor):
             )
 
     def sensed(self) -> Floats | None:
-        """Return the external sensor's reading for the next tick; call each tick while it has values."""
+        """Return the external sensor's reading for the next tick; call once per tick while it has values."""
         self.awake = True
         return self.external.next()
 
@@ -217,7 +217,7 @@ class ForceControl(Monitor):
         return found
 
     def look(self, sample: Sample) -> MonitorFinding | None:
-        """Detect excessive force, and deviation in an axis that is not compliant."""
+        """Detect excessive force, deviation in an axis that is not compliant, and a change of the force's source."""
         # Without sensor and compliance there is nothing to monitor: sleep.
         leads = isinstance(self._cycle.trajectory, Compliant)
         if sample.wrench is None and self._contact is None and self._source == DRIVES and not leads:
@@ -243,7 +243,7 @@ class ForceControl(Monitor):
         return MonitorFinding(why, "limit_force", "protective_stop")
 
     def _note_contact(self, contact: ContactWatch, sample: Sample, pressed: Sequence[Floats]) -> None:
-        """Pass the force to the contact watch, which restarts if the force's reference changes."""
+        """Pass the force to the contact watch; drop the watch if zero or declared payload have changed."""
         basis = self._forces.basis
         if basis != self._basis:
             self._basis, self._contact = basis, None
@@ -259,7 +259,7 @@ class ForceControl(Monitor):
         return DRIVES if sample.wrench is None else "the arm's force sensor"
 
     def _follow_source(self, source: str) -> MonitorFinding | None:
-        """End force control if the source of the force changes, which makes the zero meaningless."""
+        """If the source of the force changes, forget the zero, which was the old source's, and end force control."""
         if source == self._source:
             return None
         self._source, self._contact = source, None

@@ -20,8 +20,8 @@ G = TypeVar("G", bound=Guided)
 class Guidance:
     """Starts guided motions, from rest or by taking over a motion, and stops them.
 
-    They are unshaped unless the first command requests shaping at rest. An unshaped one starts from the
-    newest shaped reference of any motion. Further commands continue from the reference of the previous one.
+    A guided motion is unshaped unless its first command comes at rest and requests shaping. An unshaped one
+    starts from the newest shaped reference of any motion. Later commands continue the same reference.
     """
 
     def __init__(self, motion: MotionControl) -> None:
@@ -44,7 +44,7 @@ class Guidance:
         arm.near((turned(rotation, turn(rotation, rotation)), position), q)
 
     def servo(self, q: Floats, lookahead: float, gain: float, *, shaped: bool) -> int:
-        """Follow a posture, see `ServoFollower`, and return the motion's number; RefusalError as in `check`."""
+        """Follow a posture, see `ServoFollower`; return the motion's number. Raise RefusalError as `check` does."""
         self.check("servo_j", shaped=shaped)
         servo = self._present(ServoFollower, shaped) or ServoFollower(
             self._start(shaped), self._most(shaped), self.reach, self.torque
@@ -53,7 +53,7 @@ class Guidance:
         return self.follow("servo_j", servo, shaped=shaped)
 
     def move_joints(self, qd: Floats, acceleration: float, *, shaped: bool) -> int:
-        """Approach joint velocities, see `Speed`; return the motion's number. RefusalError as in `check`."""
+        """Approach joint velocities, see `Speed`; return the motion's number. Raise RefusalError as `check` does."""
         self.check("speed_j", shaped=shaped)
         if shaped:
             most = self._most(shaped).velocity
@@ -63,7 +63,7 @@ class Guidance:
     def move_tool(
         self, twist: Floats, acceleration: float, angular_acceleration: float, *, shaped: bool
     ) -> int:
-        """Approach a tool velocity, see `Speed`; return the motion's number. RefusalError as in `check`."""
+        """Approach a tool velocity, see `Speed`; return the motion's number. Raise RefusalError as `check` does."""
         self.check("speed_l", shaped=shaped)
         accelerations = (acceleration, angular_acceleration)
         return self._approach("speed_l", self.motion.tool, twist, accelerations, shaped=shaped)
@@ -90,7 +90,7 @@ class Guidance:
         self._halt(trigger, stop, stop.duration)
 
     def stop_tool(self, acceleration: float, angular_acceleration: float) -> None:
-        """Come to rest with a deceleration of the tool, straight if `speed_l` moves it [m/s^2, rad/s^2]."""
+        """Come to rest with a deceleration of the tool [m/s^2, rad/s^2]; a tool moved by `speed_l` stays straight."""
         cycle = self._cycle
         state, present, tool = cycle.newest, cycle.trajectory, self.motion.tool
         fastest, twist = float(np.abs(state.qd).max()), tool.jacobian(state.q) @ state.qd
@@ -114,13 +114,13 @@ class Guidance:
         return self._cycle.filter.reduced_limits(self.limits) if shaped else self.limits
 
     def check(self, trigger: str, *, shaped: bool = False) -> None:
-        """Raise RefusalError if the present activity does not allow a command."""
+        """Raise RefusalError if a command is not allowed now, or wants shaping that could only begin at rest."""
         self.motion.check(trigger)
         if shaped and self.motion.activity is not Activity.REST and not self._continues(shaped):
             raise invalid("shaped", "true", "false, since this motion does not begin at rest", code="busy")
 
     def _continues(self, shaped: bool) -> bool:
-        """Return whether a command continues the previous one's reference."""
+        """Return whether a command continues the reference of the previous command."""
         return self.motion.activity is Activity.GUIDED and shaped == self._cycle.mode.shaped
 
     def _present(self, kind: type[G], shaped: bool) -> G | None:
@@ -129,32 +129,32 @@ class Guidance:
 
     @property
     def compliant(self) -> Compliant | None:
-        """The present force-compliant motion; None without one."""
+        """The present motion with compliance (force mode or freedrive); None without one."""
         present = self._cycle.trajectory
         guided = self.motion.activity is Activity.GUIDED
         return present if guided and isinstance(present, Compliant) else None
 
     @property
     def guided(self) -> Guided | None:
-        """The present guided motion, inside a compliant one if any; None if none can continue."""
+        """The present guided motion, also if it is part of a compliant motion; None without one."""
         lead = self.compliant
         found = self._cycle.trajectory if lead is None else lead.inner
         return found if self.motion.activity is Activity.GUIDED and isinstance(found, Guided) else None
 
     @property
     def reference(self) -> Floats:
-        """Position from which the next motion starts, without compliance, shape (n,) [rad]."""
+        """Joint positions of the present reference without the effect of compliance, shape (n,) [rad]."""
         return self._cycle.sample.reference if self.compliant is None else self.compliant.nominal
 
     @property
     def resting(self) -> bool:
-        """Whether nothing moves except by compliance."""
+        """Whether no motion is commanded; compliance may still move the arm."""
         lead = self.compliant
         return not self.motion.activity.moving if lead is None else lead.inner.finished
 
     @property
     def state(self) -> tuple[Floats, Floats, Floats]:
-        """Position, velocity and acceleration of the present reference, where an unshaped one starts."""
+        """Position, velocity and acceleration from which a new unshaped motion starts."""
         return self._start(shaped=False) if self.compliant is None else self.compliant.state
 
     def stand(self, deceleration: float) -> None:
@@ -171,7 +171,7 @@ class Guidance:
         return stop
 
     def slow_down(self) -> None:
-        """End a commanded velocity until the next command; a commanded posture may stay."""
+        """Until the next command, bring a motion with commanded velocity to rest; a commanded posture stays."""
         if isinstance(present := self.guided, Speed):
             present.come_to_rest()
 
@@ -179,7 +179,7 @@ class Guidance:
         cycle, lead = self._cycle, self.compliant
         if self._continues(shaped) and (present := self.guided) is not None:
             return present.state
-        if lead is not None:  # its inner reference is at rest
+        if lead is not None:  # the inner reference of the compliant motion is at rest
             return lead.nominal, np.zeros_like(lead.nominal), np.zeros_like(lead.nominal)
         if cycle.mode.at_rest:
             q = cycle.sample.reference if shaped else cycle.position
@@ -188,7 +188,7 @@ class Guidance:
         return newest.q, newest.qd, newest.qdd
 
     def follow(self, trigger: str, trajectory: Guided, *, shaped: bool = False) -> int:
-        """Start a trajectory, in the other axes of a compliant motion if any; return the motion's number."""
+        """Start a trajectory, during a compliant motion in its stiff axes; return the motion's number."""
         motion, cycle, guard, lead = self.motion, self._cycle, None, self.compliant
         if lead is not None and trajectory is not lead:
             lead.take(trajectory)

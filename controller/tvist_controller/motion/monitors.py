@@ -29,9 +29,9 @@ class Monitor(ABC):
     """Checks the signals of each tick afterwards; `SafetyControl` has a robot's list of monitors."""
 
     needs: ClassVar[Literal["nothing", "drives", "drives alone"]] = "nothing"
-    """Run every tick, only while the drives hold the arm, or only if also no motion is compliant."""
+    """When to run: every tick, only while the drives hold the arm, or only if in addition no motion is compliant."""
 
-    awake = True  # false to skip ticks without a measured force
+    awake = True  # false if the monitor may be skipped in ticks without a measured force
 
     @abstractmethod
     def look(self, sample: Sample) -> MonitorFinding | None:
@@ -51,7 +51,7 @@ class TorqueOverload(Monitor):
         self._beyond = np.zeros(len(limits), dtype=int)
 
     def look(self, sample: Sample) -> MonitorFinding | None:
-        """Return the longest overload if too long, and restart the count."""
+        """Return the longest overload if it has lasted too long, and restart the count."""
         moment = sample.measured.moment
         self._beyond = np.where(np.abs(moment) > self._limits, self._beyond + 1, 0)
         joint = int(np.argmax(self._beyond))
@@ -70,14 +70,14 @@ class TorqueOverload(Monitor):
 
 
 class ShaperMonitor(Monitor):
-    """Detects a failing shaper, and warns once if it or its feed-forward cannot work as intended."""
+    """Detects a failing shaper; warns once if the shaper misses its specification or its feed-forward is limited."""
 
     def __init__(self, cycle: ControlCycle) -> None:
         self._cycle = cycle
         self._clipped = self._limited = False
 
     def look(self, sample: Sample) -> MonitorFinding | None:
-        """Return a fault of the filter, or a limit on its feed-forward."""
+        """Return a fault of the filter, or a warning about the shaper or its feed-forward, else None."""
         line_filter, mode = self._cycle.filter, self._cycle.mode
         if (fault := line_filter.fault) is not None:  # the filter continues with old weights
             return MonitorFinding(fault, None, "protective_stop")

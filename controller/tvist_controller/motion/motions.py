@@ -43,11 +43,11 @@ class RunningMove:
 
     @property
     def passed(self) -> float:
-        """Time spent in the last part; 0 before it [s]."""
+        """Time since the last part began; 0 before the last part [s]."""
         return 0.0 if self.coming else self._trajectory.time
 
     def extend(self, planned: PlannedMove, speed: float, slowest: float | None) -> None:
-        """Continue to further parts of the path; the plan's first part equals the last one for some ticks."""
+        """Continue to further parts of the path. The plan's first part extends the present last part."""
         longer, *coming = planned.parts
         if self.coming:
             self.coming = (*self.coming[:-1], longer, *coming)
@@ -65,7 +65,7 @@ class RunningMove:
         self._cycle.tvist.aim(self._trajectory.path.end)
 
     def _rate(self, speed: float, slowest: float | None) -> float:
-        """Return the time rate [-], lower if planned for a shaper with less delay, peak or surplus."""
+        """Return the time rate [-], lowered if the motion was planned for a shaper with less delay, peak or surplus."""
         tvist = self._cycle.tvist
         room = min(_fitting(self._window, tvist.delay), _fitting(self._peak, tvist.peak))
         if tvist.surplus != self._surplus:
@@ -77,19 +77,19 @@ class RunningMove:
 
     @property
     def progress(self) -> tuple[int, float] | None:
-        """Number of the present part, from 0, and length covered on it [m]; None on a part without length."""
+        """Number of the present part, from 0, and length covered on it [m]; None for a straight line in joint space."""
         if self._trajectory.path.posture_of is None:
             return None
         return self._parts - 1 - len(self.coming), float(self._cycle.along.newest.q[0])
 
     @property
     def stops_at(self) -> tuple[int, float] | None:
-        """Progress at the end of a stop in progress on the path; None without one."""
+        """`progress` where the arm will rest on the present part; None if it leaves the path."""
         forecast, present = self._cycle.trajectory.forecast, self.progress
         if present is None or forecast is None or forecast.path is not self._trajectory.path:
             return None
         if self._held and self._cycle.trajectory is self._trajectory:
-            return present  # paused: it does not continue to its end
+            return present  # paused: the motion does not continue to its end
         return present[0], float(forecast.end[0])
 
     @property
@@ -104,7 +104,7 @@ class RunningMove:
 
     def hold(self) -> None:
         """Pause within torque limits unless the motion ends sooner; see `PlannedMotion.hold`."""
-        if self._held or self._cycle.mode.at_rest:  # at rest, it is between two parts
+        if self._held or self._cycle.mode.at_rest:  # at rest: the motion is between two parts
             return
         trajectory, cycle = self._trajectory, self._cycle
         most = trajectory.agility.acceleration
@@ -178,7 +178,7 @@ class Motions:
             self._emit("warning", id=self._started, code=code, why=why)
 
     def guide(self, trajectory: Guided) -> int:
-        """Return the number of a guided motion, which is its predecessor's, if any."""
+        """Start a guided motion and return its number; if it replaces a running motion, it keeps that number."""
         trajectory.pace(self.wanted_speed, self.slowest)
         if self._running is None:
             return self._begin(trajectory)
@@ -192,7 +192,7 @@ class Motions:
         return self._started
 
     def go_on(self) -> bool:
-        """Start the next part of the running motion when one has come to rest; return False without one."""
+        """After a part of the running motion has come to rest, start the next part; return False without one."""
         move = self.move
         if move is None or not move.coming:
             return False
@@ -215,7 +215,7 @@ class Motions:
         self.keep_rate()
 
     def keep_rate(self) -> None:
-        """Update the running motion to the set and allowed rate."""
+        """Adapt the running motion's rate to the set speed and the limits."""
         if self._running is not None:
             self._running.pace(self.wanted_speed, self.slowest)
 
@@ -233,5 +233,5 @@ class Motions:
 
 
 def _fitting(planned: float, present: float) -> float:
-    """Return the rate at which a shaper property is no larger than planned [-]."""
+    """Return the time rate [-] that compensates a shaper property that is now larger than planned."""
     return 1.0 if present <= planned else planned / present

@@ -1,4 +1,4 @@
-"""State of the safety system, and activities of an arm at rest."""
+"""State of the safety system."""
 
 from dataclasses import dataclass, field
 from typing import Literal
@@ -33,7 +33,7 @@ class SafetySystem:
     latched: Latched | None = None  # fault or violation latched until a restart
 
     def mode(self, activity: Activity) -> SafetyMode:
-        """Return the most severe present condition as RTDE's safety mode."""
+        """Return RTDE's safety mode of the most severe present condition."""
         if self.latched is not None:
             return _LATCHED[self.latched]
         if self.emergencies:
@@ -87,7 +87,7 @@ RUNTIME = {
 
 
 def at_rest(activity: Activity, *, emergency: bool) -> Activity:
-    """Return the activity after placing the arm at rest, in an emergency stop or not."""
+    """Return the activity that follows when the arm is placed at rest."""
     if activity.protective:
         return Activity.PROTECTIVE_STOP
     if activity is Activity.BRAKING or (emergency and activity.moving):

@@ -17,7 +17,7 @@ class Unreadable(NamedTuple):
     """A set-point that cannot be decoded."""
 
     token: str | None
-    """Its token, if found."""
+    """Token of the set-point, if found."""
     why: str
     """Message with field, value and limit."""
 

@@ -20,8 +20,8 @@ from tvist_controller.trajectory.spline import Knots
 LOOKS, HALVINGS = 64, 40
 """Places at which a distance from an end is checked, and bisections of the step in which it is exceeded."""
 OFF = 1e-5  # largest deviation from a line where two blends meet, outside their radii [m]
-SHALLOW = 0.3  # largest turn of the path at a corner next to such a line [rad]
-STEEPER = 1.5  # largest ratio of the curvature where two blends meet to the smaller of both [-]
+SHALLOW = 0.3  # largest turn of the path at a corner whose blend may be extended to meet another [rad]
+STEEPER = 1.5  # largest ratio of the curvature where two blends meet to the smaller one of the blends [-]
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class LegSpeed:
     even: bool = False  # whether blends keep the tool's speed, so that only the joints limit acceleration
 
     def meeting(self, other: "LegSpeed") -> "LegSpeed":
-        """Return the pacing of a blend between two parts."""
+        """Return the speed limits of a blend between two parts."""
         return replace(
             self,
             velocity=min(self.velocity, other.velocity),
@@ -99,7 +99,7 @@ class Leg:
 
     @property
     def q(self) -> Floats:
-        """Joint positions at its start, shape (n,) [rad]."""
+        """Joint positions at the start of the leg, shape (n,) [rad]."""
         return np.asarray(self.knots.q[0])
 
 
@@ -141,13 +141,13 @@ def _meeting(leg: Leg, blend: float, before: Floats, behind: Floats) -> BlendJun
     bend = np.concatenate([_between(before[part], behind[part]) for part in (slice(3), slice(3, 6))])
     along = way.first[:3]
     speed = float(along @ along)
-    if speed > 0.0:  # the path is curved there, and not sped up
+    if speed > 0.0:  # keep only the part across the path: the blends meet with curvature but constant speed
         bend[:3] -= (bend[:3] @ along / speed) * along
     return BlendJunction(0.5 * (start + end), bend)
 
 
 def _between(one: Floats, other: Floats) -> Floats:
-    """Return a curvature between two: their mean, limited by the smaller; 0 if they bend apart."""
+    """Return a curvature between two: their mean, limited by the smaller; 0 if they bend in opposite directions."""
     if one @ other <= 0.0:
         return np.zeros_like(one)
     mean = 0.5 * (one + other)

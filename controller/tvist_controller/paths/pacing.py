@@ -15,8 +15,8 @@ from tvist_controller.trajectory.spline import Knots, SplineCurve
 
 FINEST, CELLS = 5e-4, 400  # smallest cell length [m], and largest number of cells of a run
 MARGIN = 1.01  # factor by which a derivative may exceed its samples within a cell [-]
-FASTEST = 1e3  # largest factor of speeding up for a duration; the joints then limit by far [-]
-JOLT_SHARE = 0.3  # fraction of joint jerk available to each effect of the curve [-]
+FASTEST = 1e3  # largest speed-up factor for a requested duration; joint limits apply long before [-]
+JOLT_SHARE = 0.3  # fraction of joint jerk available to each of the two jerk terms of the curve's shape [-]
 BRIEFEST = 1e-3  # shortest duration planned for [s]
 TRIES = 4  # attempts to plan an extended motion more slowly after slightly exceeding limits
 MOMENTS = 500  # number of moments at which a motion's velocity is checked
@@ -45,13 +45,13 @@ def joined(run: Run, before: Knots | None = None) -> Knots:
 
 def law_of(
     run: Run,
-    curve: SplineCurve,  # the joints' way along it
+    curve: SplineCurve,  # the joints' motion along the run
     ground: "PathLimits",
     limits: JointLimits,
     jerk: float,  # largest along the path [m/s^3]
     window: float,  # time over which the shaper mixes moments of the motion [s]
     *,
-    goes_on: bool = False,  # whether others may continue it
+    goes_on: bool = False,  # whether another run may continue this one
 ) -> RetimedLaw:
     """Return the quickest time law of a run, or the one with the requested duration."""
     asked = [piece.pacing.duration for piece in run]
@@ -64,19 +64,19 @@ def law_of(
             hurry = min(1.05 * hurry * law.duration / wanted, FASTEST)
             law = quickest_law(ground.way(limits, hurry), jerk, window)
         law = law.slowed(wanted)
-    # Slow it down by the per mille by which limits may be exceeded between samples.
+    # Between samples the law may exceed limits by some per mille; slow it down by that.
     return law.slowed(law.duration * max(_excess(law, law.moments, curve, limits), 1.0))
 
 
 def going_on(
     before: RetimedLaw,
-    edges: tuple[int, int],  # number of its edge with which the law begins, and of equal ones behind that
-    ground: "PathLimits",  # from that edge on
+    edges: tuple[int, int],  # edge of `before` at which the law begins, and number of equal edges behind it
+    ground: "PathLimits",  # limits from that edge on
     curve: SplineCurve,
     limits: JointLimits,
     jerk: float,
     window: float,
-    slower: float,  # factor of its speed, at most 1 [-]
+    slower: float,  # factor of the law's speed, at most 1 [-]
 ) -> RetimedLaw | None:
     """Return the quickest law that extends another; see `longer_law`, other arguments as in `law_of`."""
     first, known = edges
@@ -96,7 +96,7 @@ def going_on(
 
 
 def _excess(law: RetimedLaw, moments: Floats, curve: SplineCurve, limits: JointLimits) -> float:
-    """Return the largest ratio of the speed to the speed that keeps joint limits, at some moments [-]."""
+    """Return the largest ratio, at some moments, of the speed to the speed that would keep joint limits [-]."""
     velocity, acceleration = shares(law, moments, curve, limits)
     return max(float(velocity.max()), float(np.sqrt(acceleration.max())))
 
@@ -119,30 +119,30 @@ def fastest(law: RetimedLaw, curve: SplineCurve) -> float:
 
 
 class PathLimits(NamedTuple):
-    """Limits of a run, cell by cell, before speeding up."""
+    """Limits of a run, cell by cell, without a speed-up factor."""
 
     places: Floats  # cell boundaries, shape (c + 1,) [m]
     speed: Floats  # requested tool speed, shape (c,) [m/s]
-    p: Floats  # fraction of its acceleration limit per unit of s̈, shape (c,) [s^2/m]
-    q: Floats  # fraction of its acceleration limit per unit of ṡ², shape (c,) [s^2/m^2]
+    p: Floats  # fraction of the tool's acceleration limit per unit of s̈, shape (c,) [s^2/m]
+    q: Floats  # fraction of the tool's acceleration limit per unit of ṡ², shape (c,) [s^2/m^2]
     slope: Floats  # bound of |dq/ds|, shape (c, n) [rad/m]
     second: Floats  # bound of |d²q/ds²|, shape (c, n) [rad/m^2]
     third: Floats  # bound of |d³q/ds³| of any joint, shape (c,) [rad/m^3]
 
     def then(self, first: int, last: int, run: Run, curve: SplineCurve) -> "PathLimits":
-        """Return the limits of the part between two edges followed by a run, on a curve."""
+        """Return the limits of the part between the edges `first` and `last`, followed by a run, on a curve."""
         further = ground_of(run, curve, float(self.places[last]))
         places = np.concatenate((self.places[first : last + 1], further.places[1:]))
         pairs = zip(self[1:], further[1:], strict=True)
         ground = PathLimits(places, *(np.concatenate((own[first:last], other)) for own, other in pairs))
-        if last > first:  # a spline's third derivative at a knot is that behind it, which is another one now
+        if last > first:  # a spline's third derivative at a knot is that behind it, which has changed here
             looks = _looks(self.places[last - 1 : last + 1])
             ground.third[last - first - 1] = _largest(np.abs(curve.third(looks))).max()
         return ground
 
     def way(self, limits: JointLimits, hurry: float) -> RetimingLimits:
         """Return the limits of the motion sped up by the factor `hurry`."""
-        # Joint jerk: q''' ṡ³ + 3 q'' ṡ s̈ + q' s⃛; each of the first two terms gets a share.
+        # Joint jerk: q''' ṡ³ + 3 q'' ṡ s̈ + q' s⃛; each of the first two terms gets a share of the limit.
         smooth = np.cbrt(JOLT_SHARE * limits.jerk / np.maximum(self.third, MIN_DERIVATIVE))
         even = np.minimum(hurry * self.speed, smooth)
         fastest = (limits.velocity / np.maximum(self.slope, MIN_DERIVATIVE)).min(axis=1)
@@ -161,7 +161,7 @@ class PathLimits(NamedTuple):
 
 
 def ground_of(run: Run, curve: SplineCurve, start: float = 0.0) -> PathLimits:
-    """Return the limits of a run that starts at a place of a curve [m]."""
+    """Return the limits of a run whose first point is at length `start` of a curve [m]."""
     largest = max((float(curve.end[0]) - start) / CELLS, FINEST)
     starts = start + np.concatenate(([0.0], np.cumsum([piece.knots.s[-1] for piece in run])))
     edges, tool = [np.array([start])], []
@@ -180,7 +180,7 @@ def ground_of(run: Run, curve: SplineCurve, start: float = 0.0) -> PathLimits:
 
 
 def _tool(piece: Piece, places: Floats) -> tuple[Floats, Floats]:
-    """Return the tool's speed and curvature per unit of the parameter in each cell; 1 and 0 on legs."""
+    """Return the tool's speed and second derivative per unit of the parameter in each cell; 1 and 0 on legs."""
     count = len(places) - 1
     if piece.bent is None:
         return np.ones(count), np.zeros(count)
@@ -189,14 +189,14 @@ def _tool(piece: Piece, places: Floats) -> tuple[Floats, Floats]:
 
 
 def _joints(curve: SplineCurve, places: Floats) -> tuple[Floats, Floats]:
-    """Return `_tool` for the joints' motion, with turns counted as lengths."""
+    """Return the same as `_tool` for the joints' motion, with turns counted as lengths (`PER_RADIAN`)."""
     _, slope, second = curve.derivatives(_looks(places))
     along, bent = (PER_RADIAN * _largest(np.abs(values)).max(axis=1) for values in (slope, second))
     return np.maximum(along, MIN_DERIVATIVE), bent
 
 
 def _looks(places: Floats) -> Floats:
-    """Return both ends and the middle of each cell, shape (2 c + 1,)."""
+    """Return the places at which limits are sampled: both ends and the middle of each cell, shape (2 c + 1,)."""
     looks = np.empty(2 * len(places) - 1)
     looks[::2], looks[1::2] = places, 0.5 * (places[:-1] + places[1:])
     return looks
@@ -208,7 +208,7 @@ def _largest(values: Floats) -> Floats:
 
 
 def timed(pacing: LegSpeed, length: float) -> LegSpeed:
-    """Return a leg's pacing; a duration becomes a trapezoid with ramps of a third each."""
+    """Return a leg's speed limits; for a duration, those of a trapezoid whose two ramps each take a third of it."""
     if pacing.duration is None:
         return pacing
     duration = max(pacing.duration, BRIEFEST)

@@ -49,11 +49,11 @@ class _Cut:
 
 @dataclass(frozen=True)
 class Branch:
-    """Point of a run behind which further legs may change it."""
+    """Point of a run from which further legs may change the rest."""
 
-    s: float  # length of the run up to it [m]
-    legs: tuple[Leg, ...]  # legs from it on
-    begun: float  # length of the first of them before the point [m]
+    s: float  # length of the run up to the point [m]
+    legs: tuple[Leg, ...]  # legs from the point on
+    begun: float  # length of the first of these legs before the point [m]
     q: Floats  # joint positions there, shape (n,) [rad]
     bend: Floats | None = None  # curvature of two blends that meet there, see `BlendJunction`; else None
 
@@ -63,11 +63,11 @@ class Route(NamedTuple):
 
     runs: list[Run]
     skipped: list[str]  # message for each omitted blend
-    branches: list[Branch]  # points at which its last run may continue differently, in order
+    branches: list[Branch]  # points of the last run at which further legs may change it, in order
 
 
 def route_of(legs: Sequence[Leg], tracker: Tracker, start: Branch | None = None) -> Route:
-    """Divide a path at its stops into runs, from `start` or the first leg's start; raise WayError if impossible."""
+    """Divide a path into runs at its stops, from `start` (default: the first leg's); raise WayError if impossible."""
     route, last = Route([Run()], [], []), len(legs) - 1
     meets = meetings(legs)
     here = start
@@ -109,7 +109,7 @@ def _cut_at(
     route: Route,
     tracker: Tracker,
 ) -> _Cut | None:
-    """Return the blend after a leg, else None; record the reason for an omitted one."""
+    """Return the blend after a leg; None without one. If a requested blend is impossible, record the reason."""
     leg = legs[number]
     if leg.blend == 0.0 or number + 1 == len(legs):
         return None
@@ -139,7 +139,7 @@ def length_of(run: Run) -> float:
 
 
 def _from(q: Floats, cut: _Cut, tracker: Tracker) -> _Cut:
-    """Start a tool blend at the actual posture, which may differ on a redundant arm."""
+    """Let a tool blend start at the actual posture q, which on a redundant arm may differ from the planned one."""
     piece = cut.piece
     if cut.curve is None or np.abs(piece.knots.q[0] - q).max() <= SAME:
         return cut
@@ -147,7 +147,7 @@ def _from(q: Floats, cut: _Cut, tracker: Tracker) -> _Cut:
 
 
 def _rest_of(leg: Leg, start: float, end: float, q: Floats, tracker: Tracker) -> Piece:
-    """Return the part of a leg left by its blends, from the present posture."""
+    """Return the part of a leg between its blends, starting at posture q."""
     if start == 0.0 and end == leg.way.length and (q == leg.q).all():
         return Piece(leg.knots, leg.pacing, None, isinstance(leg.way, JointWay), leg.where)
     if isinstance(leg.way, JointWay):
@@ -204,7 +204,7 @@ def _blend(
     q: Floats,
     tracker: Tracker,
 ) -> tuple[Piece, ToolCurve | None]:
-    """Return a blend that replaces lengths of two legs, and the tool's curve; q is the present posture."""
+    """Return a blend that replaces `lengths` of two legs, and the tool's curve if any; q is the present posture."""
     pacing, (before, after) = leg.pacing.meeting(then.pacing), lengths
     start = leg.way.length - before
     if isinstance(leg.way, JointWay) or isinstance(then.way, JointWay):
@@ -219,14 +219,14 @@ def _blend(
     drawn_out = meets != (None, None)
     share = _rounding(leg, first, last, drawn_out=drawn_out)
     blend = ToolBlend(first, last, leg.corner.rotation, share * (before + after))
-    curve = blend if drawn_out else evenly(blend)  # an extended one is already even
+    curve = blend if drawn_out else evenly(blend)  # an extended blend already has nearly constant speed
     if meets[0] is None:
         q, _, _ = _joints(leg, start, tracker, from_end=True)
     return Piece(tracker.follow(curve, q), pacing, None if pacing.even else curve, False, leg.where), curve
 
 
 def _rounding(leg: Leg, start: ToolState, end: ToolState, *, drawn_out: bool) -> float:
-    """Return a blend's length, relative to what it replaces, for least curvature of its polynomial.
+    """Return a blend's parameter length relative to the replaced lengths, for least curvature of its polynomial.
 
     Fitted to corners of 20° to 170°: the largest curvature is 1.1 to 1.2 times that of an arc. A blend
     extended to meet another has the length of an arc.
@@ -242,7 +242,7 @@ def _rounding(leg: Leg, start: ToolState, end: ToolState, *, drawn_out: bool) ->
 
 
 def _joints(leg: Leg, s: float, tracker: Tracker, *, from_end: bool) -> tuple[Floats, Floats, Floats]:
-    """Return joint positions on a leg with derivatives, tracked from the posture at one of its ends."""
+    """Return joint positions and derivatives at s on a leg, tracked from the posture at its start or end."""
     if isinstance(leg.way, JointWay):
         return leg.way.at(s)
     corner, near, sign = (leg.way.length, leg.knots.q[-1], -1.0) if from_end else (0.0, leg.knots.q[0], 1.0)

@@ -39,11 +39,11 @@ class ToolCurve(ABC):
 
 
 class ToolWay(ToolCurve):
-    """Path of the tool that can be blended with the next."""
+    """Path of the tool that can be blended with the next path."""
 
     @abstractmethod
     def within(self, radius: float) -> float:
-        """Return the length from either end within the radius [m]; it may exceed the curve or be infinite."""
+        """Return the length, from either end, within the radius [m]; may be longer than the curve, or infinite."""
 
 
 class ToolLine(ToolWay):
@@ -71,7 +71,7 @@ class ToolLine(ToolWay):
 class ToolArc(ToolWay):
     """Arc of a circle from one pose through a point to another pose.
 
-    The tool turns with the tangent, ignoring the end orientation, or steadily to it by the shortest way.
+    The tool turns with the tangent, ignoring the end orientation, or steadily to the end orientation the shortest way.
     Raise ValueError if points coincide or are collinear.
     """
 
@@ -130,7 +130,7 @@ class ToolPart(ToolCurve):
 
 
 class ToolBlend(ToolCurve):
-    """Quintic path of given length between two tool states, in position and turn relative to the corner."""
+    """Quintic path of given length between two tool states; position and turn are relative to the corner."""
 
     def __init__(self, start: ToolState, end: ToolState, corner: Floats, length: float) -> None:
         self.length, self._corner = length, corner
@@ -188,7 +188,7 @@ def _at_corner(state: ToolState, corner: Floats) -> tuple[Floats, Floats, Floats
 
 
 def evenly(blend: ToolBlend) -> "ToolBlend | EvenBlend":
-    """Return the blend at constant tool speed; unchanged if it nearly stops in between."""
+    """Return the blend parametrized for constant tool speed; unchanged if the tool nearly stops within the blend."""
     speeds, _ = blend.shape(np.linspace(0.0, blend.length, PIECES + 1))
     ends = abs(float(speeds[0]) - 1.0) + abs(float(speeds[-1]) - 1.0)
     return blend if float(speeds.min()) < SLOWEST or ends > EVEN else EvenBlend(blend)

@@ -61,7 +61,7 @@ class Tracker:
         return None if second is None else (first, second)
 
     def follow(self, curve: ToolCurve, q: Floats) -> Knots:
-        """Return the joints' motion along a tool path; raise WayError if singular or out of reach."""
+        """Return the joints' motion along a tool path; raise WayError if the path is singular or out of reach."""
         pieces = 1 if curve.length < SHORT else max(int(np.ceil(curve.length / SPACING)), 2)
         knots, step = [self._knot(curve, 0.0, q)], curve.length / pieces
         # One by one, so that a long path out of reach fails after few knots.
@@ -71,7 +71,7 @@ class Tracker:
         return Knots(np.array(s), *(np.array(values) for values in rest))
 
     def _between(self, curve: ToolCurve, start: "Knot", end: float) -> list["Knot"]:
-        """Return knots up to a place, close enough for a polynomial between them to keep to the path."""
+        """Return knots up to `end`, so dense that polynomials between them stay near the path."""
         length = end - start[0]
         guess = start[1] + length * (start[2] + 0.5 * length * start[3])
         middle = 0.5 * (start[0] + end)

@@ -31,8 +31,8 @@ from tvist_shaping.named import BUILT_IN, AnyShaper, Registry
 
 SURPLUSES = deque[tuple[ModeSource, AnyShaper | None, str, int, tuple[float, float]]](maxlen=32)
 """Cache of `surplus` for all robots: source of modes, own shaper, name, number of modes, result."""
-POSTURES = 40  # number of postures at which modes are computed for it
-HALF_STEP = 0.03  # half the travel over which their change is measured [rad]
+POSTURES = 40  # number of postures at which modes are computed for `surplus`
+HALF_STEP = 0.03  # half the travel over which the modes' change is measured [rad]
 TIME = 0.01  # time over which the quickest change of modes is measured [s]
 MARGIN = 1.1  # margin for postures not computed [-]
 RISE = 15.0  # ratio of largest D̈ to largest Ḋ, twice that of random streams [1/s]
@@ -43,9 +43,9 @@ ESTIMATORS = ("fixed", "polynomial", "modal")
 
 @dataclass(frozen=True)
 class FilterChoice:
-    """A filter and what it needs."""
+    """A filter with its source of modes, feed-forward and friction."""
 
-    source: ModeSource  # source of its modes
+    source: ModeSource  # source of the filter's modes
     tvist: Filter
     elastic: ElasticFeedForward | None  # elastic feed-forward for the drives; None if not used
     law: Floats | None = None  # known friction of the joints, see `known_friction`; None if unknown
@@ -71,8 +71,8 @@ class FilterPlanner:
     ) -> FilterChoice:
         """Return a filter by name for a number of modes to suppress; `where` is the field of the name.
 
-        It uses the chosen source, or the arm's modal estimator if it needs more modes. Raise RefusalError if
-        there is no such filter.
+        The filter uses `source`, or the arm's modal estimator if it needs more modes than the source has. Raise
+        RefusalError if there is no such filter.
         """
         wanted = wanted_modes(name, modes, where, self._known)
         if wanted > source.most and self._modal is not None:
@@ -90,7 +90,7 @@ class FilterPlanner:
         return self._with_feed_forward(source, tvist, where)
 
     def with_payload(self, payload: Payload, present: FilterState) -> Filter | None:
-        """Return the present filter with modes for another payload; None if these are unknown."""
+        """Return the present filter with modes for another payload; None if modes do not depend on payload."""
         return self._again(present, present.source, payload, "mass") if present.source.knows_payload else None
 
     def like(self, present: FilterState) -> Filter:
@@ -110,7 +110,7 @@ class FilterPlanner:
         return tvist
 
     def _surplus(self, tvist: Filter, source: ModeSource) -> tuple[float, float]:
-        """Return the filter's `surplus` for any payload, cached because it takes long."""
+        """Return the filter's largest `surplus` for all payloads, cached because it takes long."""
         name, modes, own = tvist.name, tvist.estimator.modes, self._known.own.get(tvist.name)
         for known, same, named, with_modes, found in tuple(SURPLUSES):
             if same is own and (named, with_modes) == (name, modes) and known == source:
@@ -145,7 +145,7 @@ class FilterPlanner:
 
 
 def _rehearse(tvist: Filter) -> None:
-    """Run a copy on a small motion, so that no tick has to load the filter's code."""
+    """Run a copy of the filter on a small motion, so that no tick has to load the filter's code."""
     copy = tvist.fork()
     for tick in range(REHEARSED):
         copy.filter(np.full(tvist.joints, 1e-4 * tick))
@@ -182,7 +182,7 @@ def make_estimator(source: ModeSource, modes: int, payload: Payload, where: str)
 def choose_filter(
     name: str, estimator: Estimator, joints: int, *, where: str = "shaper", known: Registry = BUILT_IN
 ) -> Filter:
-    """Make a filter by its name, from the field `where`; raise RefusalError if that is impossible."""
+    """Make a filter by its name; if that is impossible, raise RefusalError for the field `where`."""
     with _refusing(where):
         return known.make_filter(name, estimator, joints=joints)
 
@@ -242,12 +242,12 @@ def _calibration(command: SetEstimator, setup: Setup) -> Calibration:
 def surplus_of(
     tvist: Filter, estimators: Iterable[Estimator], description: RobotDescription
 ) -> tuple[float, float]:
-    """Return relative excesses of velocity and acceleration over a reference's, see `Filter.surplus` [-].
+    """Return the shares by which a filter's velocity and acceleration may exceed the reference's limits [-].
 
     While the mean delay D shrinks, velocity is 1 - Ḋ times the reference's, and acceleration contains (1 -
     Ḋ)² ẍ - ẋ D̈. Modes of a smooth estimator change quickest if all joints move at full speed in the worst
-    direction; those of an abrupt one at most as `TvistFilter` allows. Negative weights add at most what the
-    acceleration limit permits within the filter's length. `estimators` are the filter's, one per payload.
+    direction. Modes of an abrupt one change at most as `TvistFilter` allows. Negative weights add at most what
+    the acceleration limit permits within the filter's length. There is one of the `estimators` per payload.
     """
     limits, peak = arm_limits(description), tvist.peak
     reach = np.minimum(description.limits.position, np.pi)

@@ -1,4 +1,4 @@
-"""Motions as quick as requested, or slower as limits require; near a limit, shaped in advance."""
+"""Planning of motions as quick as requested, or as limits permit; near a limit, by shaping them in advance."""
 
 import itertools
 import math
@@ -24,8 +24,8 @@ EASY = MotionLimits(velocity=1.5, acceleration=2.0, jerk=100.0)
 KEEPING_TRIES = 4  # number of trial motions to keep the requested acceleration
 SHARE = 1.0 - 1e-4  # fraction of the limit to aim at; the peak varies slightly with the motion [-]
 TRIES = 10  # number of trial motions before each further one is slower by a fraction that doubles
-HASTE = 0.001  # the first such fraction [-]
-SPLIT = 6  # number of trials that reduce either velocity or acceleration, before both
+HASTE = 0.001  # the first of these fractions [-]
+SPLIT = 6  # number of trials that reduce velocity or acceleration alone; further ones reduce both
 SAMPLES = 64
 """Number of evenly spaced moments checked, in addition to those of the law, if not shaped in advance."""
 BLUNTED = 1.05  # largest ratio of the shaped motion's torque to the unshaped motion's, due to the lag [-]
@@ -42,7 +42,7 @@ class Slower(NamedTuple):
 
     @property
     def rate(self) -> float:
-        """Time rate at which the motion keeps both [-]."""
+        """Time rate at which the motion keeps both factors [-]."""
         return min(self.velocity, math.sqrt(self.acceleration))
 
 
@@ -62,9 +62,9 @@ class Fitted(NamedTuple):
     """A motion within the limits."""
 
     motion: PlannedMotion
-    slower: Slower = AS_ASKED  # how much slower it is than requested
+    slower: Slower = AS_ASKED  # how much slower the motion is than requested
     limited: Limited | None = None  # limit that slows it down, or that it exceeds; see `PlannedMove.limited`
-    q: Floats | None = None  # posture that made it slower, shape (n,) [rad]; else None
+    q: Floats | None = None  # posture in which the limit applies, shape (n,) [rad]; None without one
 
 
 class Fitter:
@@ -83,10 +83,10 @@ class Fitter:
         tvist: Callable[[], Filter] | None,
         limits: MotionLimits | None = None,
     ) -> Fitted:
-        """Plan a motion, repeatedly slower while it exceeds a limit.
+        """Plan a motion; while it exceeds a limit, plan it again more slowly.
 
-        Near a limit, it is shaped in advance by the filter from `tvist`; None if that takes too long, which keeps the
-        filter's `surplus` free instead. `limits` are the requested ones; None if something else sets the speed.
+        Near a limit, the motion is shaped in advance by the filter from `tvist`. With None, to save time, the filter's
+        `surplus` is kept free instead. `limits` are the requested ones; None if something else sets the speed.
         """
         asked, need, slower = make(AS_ASKED), None, AS_ASKED
         motion = asked
@@ -98,7 +98,7 @@ class Fitter:
             by = found.slower
             need = found if need is None else min(need, found, key=lambda each: each.slower.rate)
             if number >= SPLIT:
-                # The impulses' duration is constant, so a slower motion may use more of a limit than the last one.
+                # A shaper's duration is constant, so a slower motion may use more of a limit than the last one.
                 most = 1.0 - min(HASTE * 2.0 ** (number - TRIES), 0.5) if number >= TRIES else 1.0
                 rate = min(by.rate, most)
                 by = Slower(rate, rate**2)
@@ -118,7 +118,7 @@ class Fitter:
     def _need(
         self, motion: PlannedMotion, now: PlanningState, tvist: Callable[[], Filter] | None
     ) -> Need | None:
-        """Return how much slower a motion must be: bounded by the filter's surplus first, then as shaped."""
+        """Return how much slower a motion must be: by a bound with the filter's surplus or, if too much, as shaped."""
         q, qd, qdd = _states(motion)
         faster, harder = (1.0 + more for more in now.surplus)
         qd, qdd = faster * qd, harder * qdd
@@ -132,7 +132,7 @@ class Fitter:
     def _exceeded(
         self, q: Floats, qd: Floats, qdd: Floats, speeds: Floats, now: PlanningState, blunted: float
     ) -> Need | None:
-        """Return how much slower a motion must be for all limits; `speeds` are those between ticks."""
+        """Return how much slower a motion must be for all limits; `speeds` are the velocities to check."""
         needs = self._kinematic(q, speeds, qdd), self._dynamic(q, qd, qdd, blunted, now)
         found = [need for need in needs if need is not None]
         return min(found, key=lambda need: need.slower.rate, default=None)
@@ -152,7 +152,7 @@ class Fitter:
         return Need(slower, binding, q[min(int(np.argmax(np.abs(values))), len(q) - 1)])
 
     def _dynamic(self, q: Floats, qd: Floats, qdd: Floats, blunted: float, now: PlanningState) -> Need | None:
-        """Return how much slower a motion must be for torques, in velocity or acceleration as they depend."""
+        """Return how much slower a motion must be for torques: in acceleration, velocity or both."""
         dynamics, limits, factors = self._dynamics, self._torque, [1.0, 1.0]
         worst, need = 1.0, None
         for believed in now.bodies:
@@ -190,7 +190,7 @@ class Fitter:
 
 
 def _states(motion: PlannedMotion) -> tuple[Floats, Floats, Floats]:
-    """Return unshaped positions, velocities, accelerations, each (k, n), also at the law's own moments."""
+    """Return unshaped positions, velocities and accelerations, each (k, n), also at the law's `moments`."""
     begins, moments = motion.law.begins, motion.law.moments
     known = moments[(moments > begins) & (moments < motion.duration)]
     return motion.states(np.union1d(np.linspace(begins, motion.duration, SAMPLES), known))
@@ -205,9 +205,9 @@ def keeping_motion(
 ) -> PlannedMotion:
     """Return the quickest motion whose shaped reference keeps the limits.
 
-    A filter whose weights vary with posture adds to the acceleration, at most by its `excess` at easy limits.
-    Beyond these, the motion is shaped in advance and planned again with less acceleration. Raise ValueError
-    if there is no such motion.
+    If a filter's weights vary with posture, it adds to the acceleration: within the limits `EASY`, at most the
+    share `excess`. Beyond `EASY`, the motion is shaped in advance, and planned again with less acceleration if
+    necessary. Raise ValueError if there is no such motion.
     """
     easy = tvist.excess == 0.0 or not (
         limits.velocity > EASY.velocity or limits.acceleration > EASY.acceleration or limits.jerk > EASY.jerk
@@ -228,7 +228,7 @@ def keeping_motion(
 
 
 def shaped_ahead(motion: PlannedMotion, tvist: Filter) -> Floats | None:
-    """Return the shaped references at full rate, (k, n) [rad], None if too long; motion and filter stay unchanged."""
+    """Return the shaped references at full rate, (k, n) [rad], None if too many; arguments stay unchanged."""
     path, mine = motion.path, tvist.fork()
     shaped = ShapedReference(path.posture(path.start))
     shaped.enter(path.posture_of, path.start)

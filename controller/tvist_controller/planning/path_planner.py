@@ -40,14 +40,14 @@ from tvist_protocol.motions import MoveC, MoveL, MovePath
 from tvist_shaping.base import Filter
 
 POSTURES = 9  # number of postures of a run at which the shaper's delay is computed
-SAMPLES = 1000  # number of places of a run searched for the one hardest for a joint
+SAMPLES = 1000  # number of places of a run searched for the posture in which a limit applies
 SPARED = 0.99
 """Fraction of joint limits that paths use; a shaper with varying weights may exceed its reference a little [-]."""
 LEAST_WINDOW = 0.08
 """Shaper delay for which a path always has room, so that few changes of shaper slow it down [s]."""
 AGILE = MotionLimits(0.25, 1.2, 60.0)
 """Limits of pauses and speed changes for slower motions: the defaults of `move_l`."""
-VARIATION = 1.1  # factor by which the delay may be longer between these postures [-]
+VARIATION = 1.1  # factor by which the shaper's delay may be longer between these `POSTURES` [-]
 
 
 class PathPlanner:
@@ -60,7 +60,7 @@ class PathPlanner:
         self._reachable = reachable
 
     def plan(self, command: MoveL | MoveC | MovePath, now: PlanningState) -> PlannedMove | None:
-        """Plan a motion from rest, or an extension, None if too late; raise RefusalError if impossible."""
+        """Plan a motion from rest, or an extension (None: too late for that); raise RefusalError if impossible."""
         tracker = Tracker(self._description, now.tcp)
         legs = list(self._reachable.legs(command, tracker, now))
         count = len(command.segments) if isinstance(command, MovePath) else 1
@@ -91,7 +91,7 @@ class PathPlanner:
     def _further(
         self, jerk: float, legs: list[Leg], count: int, tracker: Tracker, now: PlanningState
     ) -> PlannedMove | None:
-        """Plan the extension of a motion to further legs; None if its end is too near."""
+        """Plan the extension of a motion to further legs; None if the arm is too near the motion's end."""
         before, tvist = now.after, self._filters.like(now.filter)
         assert before is not None
         if (found := before.branch(now.until)) is None:
@@ -132,7 +132,7 @@ class PathPlanner:
     def _check_clear(
         self, way: CheckedMotion, run: Run, part: tuple[float, float], now: PlanningState
     ) -> None:
-        """Refuse a path with a collision; `part` is the start on the whole path and the latter's length."""
+        """Refuse a path with a collision; `part` is where the run starts on the whole path, and the path's length."""
         if (found := self._moves.meeting(way, now)) is None:
             return
         share, meeting = found
@@ -188,7 +188,7 @@ class PathPlanner:
     def _curve(
         self, knots: Knots, run: Run, tvist: Filter, now: PlanningState
     ) -> tuple[SplineCurve, JointLimits]:
-        """Return the joints' motion along a run, checked for range, and their limits."""
+        """Return the joints' motion along a run, checked for range, and the joints' limits."""
         self._reachable.check_range(knots.s / knots.s[-1], knots.q, run[0].where)
         limits, peak = self._description.limits, tvist.peak
         acceleration = np.array(limits.acceleration) * (1.0 - now.excess)
@@ -210,7 +210,7 @@ class PathPlanner:
 
 
 def _told(fitted: Fitted, run: Run, start: float = 0.0) -> Limited | None:
-    """Return what slowed a motion down, and where; its run starts at `start` on its curve [m]."""
+    """Return what slowed a motion down, and where; `start` is where the run starts on the motion's curve [m]."""
     told, q, path = fitted.limited, fitted.q, fitted.motion.path
     if told is None or q is None or not isinstance(path, SplineCurve) or not run[0].where:
         return told
@@ -228,7 +228,7 @@ class _TooLateError(Exception):
 def _joined(
     moves: list[PlannedMove], route: Route, told: Limited | None, segments: range, start: float = 0.0
 ) -> PlannedMove:
-    """Join the motions of a path; its first run starts at `start` on its curve [m]."""
+    """Join the motions of a path; `start` is where the first run starts on its motion's curve [m]."""
     return moves[-1]._replace(
         parts=tuple(part for move in moves for part in move.parts),
         velocity=max(move.velocity for move in moves),
@@ -257,7 +257,7 @@ def _course(
 
 
 def marks_of(runs: list[Run], segments: range, start: float = 0.0) -> tuple[tuple[int, float], ...]:
-    """Return where each segment's end blend begins, see `PlannedMove.marks`; the first run starts at `start` [m]."""
+    """Return where the blend at each segment's end begins, see `PlannedMove.marks`; `start` as in `_joined`."""
     marks = dict[int, tuple[int, float]]()
     for part, run in enumerate(runs):
         ends = ((0.0 if part else start) + np.cumsum([piece.knots.s[-1] for piece in run])).tolist()

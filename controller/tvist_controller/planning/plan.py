@@ -1,4 +1,4 @@
-"""Rows of the command table, and plans for commands that take too long for a tick: creation and validity."""
+"""Rows of the command table; creation and validity of plans for commands that take too long for a tick."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, Generic, Literal, NamedTuple, Protocol, TypeVar
@@ -32,9 +32,9 @@ class Planning(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """Result of planning a command, valid while the underlying state holds."""
+    """Result of planning a command, valid while the state that the plan depends on stays equal."""
 
-    state: Mapping[str, Any]  # fields of the snapshot that it depends on
+    state: Mapping[str, Any]  # fields of the snapshot that the plan depends on
     found: Found | RefusalError  # what was planned, or the refusal; None if no motion may start
     until: float = 0.0  # see `PlanningState.until`
 
@@ -66,7 +66,7 @@ class MakesPlans(Protocol):
 
 
 class Plans:
-    """Plans of one robot, made now or outside the ticks, for commands of clients and programs.
+    """Makes the plans of one robot, now or outside the ticks, for commands of clients and programs.
 
     `plan` is `Planner.plan`. `snapshot` returns the present state or, with a time [s], that of a motion that continues
     the running one after this time. `order` plans outside the ticks; without it, the tick that needs a plan makes it.
@@ -127,7 +127,7 @@ class CommandCall(NamedTuple, Generic[C]):
 
 
 class CommandRow(NamedTuple):
-    """One type of command: how a controller carries it out, and what that needs.
+    """One type of command: how a controller carries out the command, and what it needs for that.
 
     The protocol's table of transitions defines which commands move the arm, and when each is allowed.
     """
@@ -142,9 +142,9 @@ class CommandRow(NamedTuple):
     changes_io: bool = False  # whether the command may change what `io` reports
     check: Callable[[Any, RobotDescription], None] | None = None
     """Refuses a command that this robot can never carry out; None if the types of the fields suffice."""
-    plan: Planning | None = None  # how it is planned; None if it is quick enough for a tick
+    plan: Planning | None = None  # how the command is planned; None if it needs no plan
     long: bool = False  # whether the message may be longer than `EXPLAINED_BYTES`
-    stops: bool = False  # whether it stops the arm and so must not wait for earlier plans
+    stops: bool = False  # whether the command stops the arm and so must not wait for earlier plans
 
     @property
     def asks(self) -> bool:

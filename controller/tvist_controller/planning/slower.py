@@ -1,4 +1,4 @@
-"""Messages about motions slower than requested: the limit responsible, unless the way is just too short."""
+"""Messages that name the limit that makes a motion slower than requested; none if only the way is too short."""
 
 from typing import NamedTuple
 
@@ -15,7 +15,7 @@ from tvist_protocol.replies import Code
 REACHED = 0.9
 """Fraction of the speed that counts as reached; a peak between two acceleration ramps stays a little lower [-]."""
 BLUNTED = 3.0
-"""The same as a ratio if the way is too short for the speed, since ramps take much of a few millimetres [-]."""
+"""On a way too short for the requested speed: tolerated ratio of its peak without to that with jerk limit [-]."""
 DURATION_TOLERANCE = 1.01  # ratio of durations up to which a motion counts as on time [-]
 USED_UP = 0.95  # fraction of a limit above which it is responsible [-]
 SAMPLES = 65  # number of places of a curve at which the joints' permitted speed is computed
@@ -57,7 +57,7 @@ JERKS = Binding("limit_acceleration", "tool and joints stay within the limits of
 def slower_path(
     run: Run, curve: SplineCurve, law: RetimedLaw, limits: JointLimits, description: RobotDescription
 ) -> Limited | None:
-    """Return the limit that prevents the speed or duration of a one-segment motion; None if just too short."""
+    """Return the limit that prevents a one-segment motion's speed or duration; None if only its way is too short."""
     pacing, way = run[0].pacing, float(curve.end[0])
     if pacing.duration is not None:
         if law.duration <= DURATION_TOLERANCE * pacing.duration:
@@ -100,5 +100,5 @@ def longer_joint_motion(motion: PlannedMotion, asked: float) -> Limited | None:
 
 
 def lasts(duration: float, asked: float) -> str:
-    """Return words for a duration other than requested [s]."""
+    """Return a message about a duration other than requested [s]."""
     return f"duration is {duration:.4g} s instead of {asked:.4g}"

@@ -22,11 +22,11 @@ SAME = 1e-9  # distance below which two knots are one [m]
 
 @dataclass(frozen=True)
 class ExtensionEdges:
-    """Edges of a law at which it is cut for an extension."""
+    """Edges at which a time law is cut for an extension."""
 
-    first: int  # first one kept
-    known: int  # last one up to which the law stays unchanged
-    branch: int  # behind this one the path may change
+    first: int  # first edge that is kept
+    known: int  # edge up to which the law stays unchanged
+    branch: int  # edge behind which the path may change
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,15 +38,15 @@ class ExtendableMotion:
     law: RetimedLaw
     branches: tuple[Branch, ...]  # points of the curve at which further moves may change it, in order
     segments: int  # number of moves so far
-    window: float  # longest shaper delay it was planned for [s]
+    window: float  # longest shaper delay for which the motion was planned [s]
 
     @property
     def end(self) -> Floats:
-        """Joint positions at its end, shape (n,) [rad]."""
+        """Joint positions at the motion's end, shape (n,) [rad]."""
         return self.curve.posture(self.curve.end)
 
     def branch(self, until: float) -> tuple[ExtensionEdges, Branch] | None:
-        """Return the first point after a time [s] at which it may change, and its cuts; None if too late."""
+        """Return cuts and point of the first possible change of the motion after a time [s]; None if too late."""
         law, edges = self.law, self.law.edges
         moment = until * law.rate
         known = int(np.searchsorted(law.times, moment))
@@ -58,7 +58,7 @@ class ExtendableMotion:
             if at >= known:
                 return ExtensionEdges(first, known, at), replace(branch, s=float(edges[at]))
         last, s = self.branches[-1], float(edges[known])
-        begun = last.begun + s - last.s  # the arm is on its last leg already
+        begun = last.begun + s - last.s  # the arm is already on the last leg
         return ExtensionEdges(first, known, known), Branch(
             s, last.legs, begun, self.curve.posture(np.array([s]))
         )
@@ -108,5 +108,5 @@ class PlanningState(Struct, frozen=True, eq=False, gc=False):
 FILTER = ("filter",)  # fields that a filter depends on
 MOTION = ("movable", "q", "speed", "slowest", "excess", "surplus", "tcp", "body", "bodies", "filter", "after")
 """Fields that a motion depends on."""
-TOOL = ("tcp",)  # fields that an answer about the tool depends on; its reference may have passed meanwhile
+TOOL = ("tcp",)  # fields that an answer about tool kinematics depends on; the arm may move on meanwhile
 SCRIPT = ("script",)  # fields that a statement for a running program depends on

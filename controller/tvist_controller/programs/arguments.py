@@ -24,7 +24,7 @@ OF_JOINTS: Final = "joints"
 
 
 def checked(method: MethodType, joints: int) -> Callable[..., Any]:
-    """Return a method that checks positional arguments as annotated; `Joints` have `joints` elements."""
+    """Wrap a method: check its positional arguments as annotated; `Joints` must have `joints` elements."""
     checks = _checks(method.__func__, joints)
     if not any(check for _, check in checks):
         return method
@@ -103,7 +103,7 @@ def whole(least: int, most: int) -> Check:
 
 
 def either(name: str, value: Value) -> bool:
-    """Return 0 or 1 as a truth value."""
+    """Convert 0 or 1 to a truth value."""
     return bool(integer(name, value, 0, 1))
 
 
@@ -180,12 +180,12 @@ def a_pose(values: Sequence[float]) -> Pose:
 
 
 def shown(value: Value) -> str:
-    """Return a value for a message."""
+    """Return a value as text for a message."""
     return "None" if value is None else f"{value}"[:60]
 
 
 def readable(text: str) -> str:
-    """Return a printable text; parts of characters, which programs can cut out, are replaced."""
+    """Return a printable text; replace incomplete characters, which programs can create by cutting texts."""
     return text if text.isascii() else text.encode(errors="surrogateescape").decode(errors="replace")
 
 

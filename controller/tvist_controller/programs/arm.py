@@ -1,4 +1,4 @@
-"""The arm as programs move it: one thread at a time, blended moves, motions that outlast their call."""
+"""Motions of programs: one thread moves the arm at a time, moves are blended, motions may outlast their call."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -24,7 +24,7 @@ TAKEN = "another thread is controlling the robot: only one thread of a program c
 class ProgramArm:
     """Carries out the motions of one robot's programs.
 
-    `thread` returns the running program and its thread's number; `lives`, whether a thread still runs;
+    `thread` returns the running program and its thread's number. `lives` returns whether a thread still runs.
     `spend` takes evaluations from the running program's budget.
     """
 
@@ -46,7 +46,7 @@ class ProgramArm:
         self._guided: int | None = None
         self._abandoned = False
         self._asked = 0  # number of threads waiting to start compliance
-        self._complying: object | None = None  # program that made the arm compliant, until it ends that
+        self._complying: object | None = None  # program that made the arm compliant, until it ends compliance
         self.lead: Callable[[Segment], Turns] | None = None  # makes a move while the arm is compliant
         self.waypoint: Segment | None = None  # target of the present or last move
 
@@ -65,7 +65,7 @@ class ProgramArm:
         yield from self._carry_out(moves)
 
     def begin(self) -> None:
-        """Start this thread's waiting moves, which can still be extended."""
+        """Start this thread's waiting moves; further moves can still be added."""
         moves = self._present()
         if moves is not None and not moves.begun:
             self._check_alone()
@@ -78,7 +78,7 @@ class ProgramArm:
             yield from self._carry_out(moves)
 
     def _carry_out(self, moves: BlendedMoves) -> Turns:
-        """Carry out moves until they are over or another one may be added."""
+        """Carry out moves until all are over, or until another move may be added."""
         if not (moves.closed or moves.full):
             return
         with self._moving():
@@ -94,7 +94,7 @@ class ProgramArm:
         self._present()
 
     def _led(self, moves: BlendedMoves) -> bool:
-        """Return whether another thread made the arm compliant, so that force control must lead moves."""
+        """Return whether force control must carry out the moves, because another thread made the arm compliant."""
         waits = moves.number is None and not moves.over
         return waits and self._access.guidance.compliant is not None
 
@@ -120,7 +120,7 @@ class ProgramArm:
             self._current.step()
 
     def then(self, effect: Callable[[], None]) -> None:
-        """Do something now, or at the start of the blend after this thread's last waiting move."""
+        """Call `effect` at the start of the blend after this thread's last waiting move; now if no move waits."""
         if (moves := self._present()) is None:
             effect()
         else:
@@ -128,7 +128,7 @@ class ProgramArm:
 
     @property
     def end(self) -> Segment | None:
-        """This thread's last waiting move."""
+        """Last waiting move of this thread; None without one."""
         moves = self._present()
         return None if moves is None else moves.legs[-1]
 
@@ -147,7 +147,7 @@ class ProgramArm:
     # ------------------------------------------------------------------ guided motions
 
     def guide(self, start: Callable[[bool], int | None], wait: Iterator[None]) -> Turns:
-        """Start or change a guided motion by `start(shaped)`, run `wait`, and return; the motion goes on."""
+        """Start or change a guided motion by `start(shaped)` and run `wait`; the motion continues after the return."""
         yield from self.finish()
         with self._moving():
             yield from self.regain()
@@ -162,7 +162,7 @@ class ProgramArm:
         return (activity.moving or activity.protective) and after(activity, command) is None
 
     def regain(self) -> Turns:
-        """Wait for the end of a stop, and for a thread to restart a lost force mode; else raise Fault."""
+        """Wait for the end of a stop and, if that ended force mode, for its restart by a thread; else raise Fault."""
         left = RESTART_TICKS
         while (stopping := self._stopping("speed_j")) or (self.compliance_lost and left > 0):
             left -= not (stopping or self._asked)
@@ -209,7 +209,7 @@ class ProgramArm:
         self.driver = None if self._guided is None else self._thread()
 
     def _replace(self, start: Callable[[], int | None]) -> None:
-        """Replace the guided motion without `hear` reporting the old one as stopped."""
+        """Replace the guided motion; `hear` then ignores that the old one has stopped."""
         guided, self._guided = self._guided, None
         try:
             with refusals_as_faults():
@@ -236,7 +236,7 @@ class ProgramArm:
                 yield
 
     def abort(self) -> None:
-        """Stop the program's present planned move, if any, and continue as if it had ended."""
+        """Stop the program's present planned move, if any; the program continues as if the move had ended."""
         if (moves := self._current) is None:
             return
         moves.skipped = True
@@ -245,7 +245,7 @@ class ProgramArm:
             moves.outcome = "motion_done"
 
     def brake(self, stop: Callable[[], None], *, wholly: bool = False) -> None:
-        """Stop the present motion at the program's request; compliance only ends if `wholly`."""
+        """Stop the present motion at the program's request; compliance continues unless `wholly`."""
         guidance = self._access.guidance
         if self._motion.activity.moving:
             self._rate_limit.charge()
@@ -278,7 +278,7 @@ class ProgramArm:
         return self._guided is not None
 
     def settle(self) -> None:
-        """Stop a motion whose thread has ended without a successor; called at the end of each turn."""
+        """Stop a motion whose thread has ended, unless another thread took over; called at the end of each turn."""
         self._rate_limit.planning = max(self._rate_limit.planning - 1, 0)
         moves = self._current
         if moves is not None and not (moves.over or self._lives(moves.owner)):
@@ -298,7 +298,7 @@ class ProgramArm:
         self._abandoned, self._rate_limit.planning = False, 0
 
     def hear(self, event: Event) -> bool:
-        """Handle an event; return whether it ended a motion against the program's will."""
+        """Handle an event; return whether it ended a motion that the program did not stop itself."""
         moves = self._current
         moving = None if moves is None else moves.number
         if event.kind == "protective_stop":
@@ -325,7 +325,7 @@ class ProgramArm:
 
     @contextmanager
     def _moving(self) -> Iterator[None]:
-        """Keep other threads from moving the arm; a thread killed meanwhile leaves its motion behind."""
+        """Keep other threads from moving the arm. If the thread is killed meanwhile, its motion counts as abandoned."""
         self._check_alone()
         self._inside = self._thread()
         self._abandoned = False

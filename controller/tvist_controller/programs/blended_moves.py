@@ -43,11 +43,11 @@ class RateLimit:
     def __init__(self, motion: MotionControl, latest: Callable[[], State]) -> None:
         self._motion, self._latest = motion, latest
         self.planning = 0  # remaining ticks of the last ordered plan
-        self._paid = 0  # tick at which all stops and plans are paid
+        self._paid = 0  # tick until which past stops and plans are charged
 
     @property
     def debt(self) -> int:
-        """Ticks until all stops and plans are paid."""
+        """Ticks that are still charged for past stops and plans."""
         return max(self._paid - self._latest().tick, 0)
 
     def charge(self) -> None:
@@ -63,9 +63,9 @@ class RateLimit:
 class BlendedMoves:
     """The blended moves of one thread, and the motion along them.
 
-    The motion starts when the last move is known, or as many as are planned together; `step` continues it
-    every tick while the thread adds moves. Each plan ends at rest, so the arm stops where no further move
-    comes in time. `rest` stops other motion and waits until a motion may start.
+    The motion starts when the last move is known, or when the most moves that are planned together wait. `step`
+    continues it every tick while the thread adds moves. Each plan ends at rest, so the arm stops where the next
+    move comes too late. `rest` stops other motion and waits until a motion may start.
     """
 
     def __init__(
@@ -74,22 +74,22 @@ class BlendedMoves:
         self._access, self._motion, self.owner = access, access.motion, owner
         self._rate_limit, self._rest = rate_limit, rest
         self.legs: list[Segment] = []  # moves not yet passed by the arm
-        self._effects: list[list[Effect]] = []  # effects of the program after each of them
+        self._effects: list[list[Effect]] = []  # effects of the program after each of these moves
         self.closed = False  # whether no more moves will come
         self.number: int | None = None  # number of the motion while it runs
-        self.outcome: str | None = None  # event that ended it
+        self.outcome: str | None = None  # event that ended the motion
         self._stops_at: tuple[int, float] | None = None
-        """Progress at the end of its protective stop, see `stop`; None without one."""
+        """Progress at the end of the motion's protective stop, see `stop`; None without one."""
         self.skipped = False  # whether `abort` was called; a motion then being planned is not started
-        self.over = False  # whether it is complete
-        self.fault: Exception | None = None  # error that its thread raises
+        self.over = False  # whether all moves are complete
+        self.fault: Exception | None = None  # error that the thread of these moves will raise
         self._steps: Turns | None = None
         self._marks: list[tuple[int, float]] = []
         """Where the blend at the end of each present move begins, see `PlannedMove.marks`."""
         self._extension: tuple[Callable[[], Plan], int, int] | None = None
         """Ordered plan of an extension, tick at which it applies, and number of moves."""
         self._final = self._refuses = False
-        """Whether the running motion cannot be extended, and whether because a further move is impossible."""
+        """Whether the running motion cannot be extended; whether the reason is that a further move is impossible."""
         self._count = 0  # number of moves of the running motion
 
     # ------------------------------------------------------------------ for the program
@@ -110,16 +110,16 @@ class BlendedMoves:
 
     @property
     def begun(self) -> bool:
-        """Whether it has started."""
+        """Whether the motion has started."""
         return self._steps is not None
 
     def hand_over(self) -> list[tuple[Segment, list[Effect]]]:
-        """Return the remaining moves and effects for another to carry out."""
+        """End these moves; return the remaining ones with their effects, to be carried out by force control."""
         self.over = True
         return list(zip(self.legs, self._effects, strict=True))
 
     def stop(self) -> None:
-        """Record a protective stop; what it passes counts as passed on resuming."""
+        """Record a protective stop. When the program resumes, moves up to the arm's place of rest count as passed."""
         move = self._motion.motions.move
         self.outcome, self._stops_at = "protective_stop", None if move is None else move.stops_at
 
@@ -189,7 +189,7 @@ class BlendedMoves:
         self._count = len(legs)
 
     def _planned(self, legs: list[Segment]) -> Generator[None, None, Plan]:
-        """Plan moves; lines, paths and joint moves in debt start a fixed time after the order."""
+        """Plan moves: joint moves at once; lines, paths, and joint moves in debt a fixed time after the order."""
         plans, command = self._access.plans, self._command(legs)
         if isinstance(command, MoveJ) and self._rate_limit.debt < PAUSE:
             self._rate_limit.charge()
@@ -239,7 +239,7 @@ class BlendedMoves:
         return True
 
     def _pass_blends(self, progress: tuple[int, float] | None) -> None:
-        """Apply effects behind blends that the arm has started, see `progress`."""
+        """Apply the effects of each blend that the arm has begun, see `RunningMove.progress`."""
         while progress is not None and len(self._marks) > 1 and progress > self._marks[0]:
             del self._marks[0]
             self._pass(1)
@@ -256,7 +256,7 @@ class BlendedMoves:
             self._motion.check("move_j")
 
     def _refused(self, refusal: RefusalError, legs: list[Segment]) -> None:
-        """End a program whose move is impossible, or stop the robot for an unreachable line or path."""
+        """For a refused move, end the program; for an unreachable line or path, make a protective stop."""
         reply = refusal.reply
         if isinstance(command_of(legs), MoveJ) or reply.code not in _UNREACHABLE:
             raise Fault(reply.why)

@@ -75,7 +75,7 @@ def _refusal(line: int, column: int, text: str) -> RefusalError:
 
 
 def built_in(description: RobotDescription) -> dict[str, str]:
-    """Return the built-in programs' texts by file name; one without moves runs until it is stopped."""
+    """Return the built-in programs' texts by file name; one of them only waits until it is stopped."""
     names = list(description.poses)
     programs = {WAIT: "def wait_program():\n  while True:\n    sync()\n  end\nend\n"}
     if names:
@@ -166,7 +166,7 @@ def check_program(text: str) -> list[ProgramFinding]:
 
 
 def _error(error: ScriptError) -> ProgramFinding:
-    """Return the compiler's error, with the function closest to an unknown name."""
+    """Return the compiler's error; for an unknown name, suggest the function with the most similar name."""
     unknown = _UNKNOWN.fullmatch(error.text)
     near = [] if unknown is None else get_close_matches(unknown[1].lower(), _NAMES, n=1, cutoff=0.75)
     said = f"{error.text} did you mean {_NAMES[near[0]]}?" if near else error.text

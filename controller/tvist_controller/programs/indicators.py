@@ -1,4 +1,4 @@
-"""Popups and outputs of programs, and supervision of rarely writing clients and threads that miss turns."""
+"""Popups and outputs of programs, and supervision: clients that write too rarely, threads that miss turns."""
 
 import re
 from collections.abc import Callable
@@ -35,7 +35,7 @@ None for no change."""
 
 
 class Popups:
-    """The popup of one robot, owned by the program returned by `owner`, until closed or replaced."""
+    """The popup of one robot. Until it is closed or replaced, it belongs to the program that `owner` returned."""
 
     def __init__(self, emit: Emit, owner: Callable[[], object]) -> None:
         self._emit, self._owner = emit, owner
@@ -52,7 +52,7 @@ class Popups:
         return self._owners is not None
 
     def close(self, owner: object | None = None) -> None:
-        """Close the popup, or only one of a given program that has ended."""
+        """Close the popup; with `owner`, a program that has ended, only if the popup belongs to that program."""
         if owner is None or self._owners is owner:
             self._owners = None
 
@@ -66,7 +66,7 @@ class RunstateOutputs:
         self._runs = False
 
     def choose(self, group: Group, place: int, what: int) -> None:
-        """Set an output's action by UR's number; 0 leaves it to programs."""
+        """Choose by UR's number what an output does in each state of the program; 0 leaves the output to programs."""
         self._choices.pop((group, place), None)
         if what:
             self._choices[group, place] = what
@@ -113,7 +113,7 @@ class Watchdogs:
         self._tick = 0
 
     def watch(self, name: str, frequency: float, action: str) -> None:
-        """Watch an RTDE input to be written at a frequency [Hz]; `pause`, `stop`, or `ignore` to end this."""
+        """Watch that an RTDE input is written at `frequency` [Hz]; else `pause` or `stop`. `ignore` ends the watch."""
         bank, place = _register(name)
         self._peripherals.changed = True
         if action == "ignore":
@@ -173,7 +173,7 @@ class MissedTurns:
         self._missed, self._warned = 0, False
 
     def look(self, starved: set[object]) -> None:
-        """Check the thread that guides the arm after all turns; `starved` programs had no turn at all."""
+        """After all turns, check the thread that guides the arm; programs in `starved` had no turn at all."""
         driver = self._arm.driver
         if driver is None or not (driver[0] in starved or driver[0].missed(driver[1])):
             self._missed = 0

@@ -20,10 +20,10 @@ WAITS, CLEAR = "interpreter_mode", "clear_interpreter"
 
 
 class StatementQueue:
-    """The statements for one robot's program.
+    """The statements that clients have added to one robot's program.
 
-    A program that calls `interpreter_mode` anywhere accepts statements from its start; they run while it
-    waits in that function.
+    If a program calls `interpreter_mode` anywhere, it accepts statements from its start on; these run while the
+    program waits in that function.
     """
 
     def __init__(
@@ -40,7 +40,7 @@ class StatementQueue:
 
     @property
     def published(self) -> Interpreter | None:
-        """State of the statements; None before the first program that accepts some."""
+        """State of the statements for `io`; None before the first program that accepts statements."""
         if not self._published:
             return None
         return Interpreter(
@@ -97,7 +97,7 @@ class StatementQueue:
         self._ending = True
 
     def clear(self) -> None:
-        """Clear all statements and what they defined, after the one that calls this."""
+        """Clear all statements and what they defined, after the present statement, which calls this."""
         if not self._waiting or self._machine() is not self._program:
             raise Fault(f"{CLEAR} can only be called while the program waits in {WAITS}()")
         self._clearing = True
@@ -108,7 +108,7 @@ class StatementQueue:
         yield from machine.add(script, f"statement {self._executed}")
         if self._clearing:
             self._forget(machine, script.scope.number)
-            if CLEAR not in script.used:  # otherwise this was done when it was added
+            if CLEAR not in script.used:  # otherwise this was done when the statement was added
                 self._restart(machine)
         if machine.left <= 0:
             yield
@@ -122,7 +122,7 @@ class StatementQueue:
         machine.forget(before)
 
     def _restart(self, machine: Machine) -> None:
-        """Compile later statements after the program alone."""
+        """Compile later statements as if they followed the program directly, without earlier statements."""
         if self.last is not None:
             self.last = machine.script.forgetting(self.last)
             self._forgotten = self._interpreted
@@ -143,7 +143,7 @@ class StatementQueue:
         return self._interpreted
 
     def _check_room(self, length: int, *, clears: bool) -> None:
-        """Refuse a statement that makes the program too large; uncleared ones may take twice the space."""
+        """Refuse a statement that makes the program too large; including statements not yet cleared, twice as large."""
         held = [characters for _, characters in self._lengths]
         added = [characters for number, characters in self._lengths if number > self._forgotten]
         full = len(held) >= HELD * MAX_STATEMENTS or sum(held) + length > HELD * MAX_SCRIPT
@@ -153,7 +153,7 @@ class StatementQueue:
             raise RefusalError("busy", "text", why, MAX_STATEMENTS)
 
     def skip(self, what: Literal["statements", "move"]) -> None:
-        """Drop the waiting statements, or the present move."""
+        """Drop the waiting statements, or skip the present move."""
         if what == "statements":
             self._queue.clear()
         else:

@@ -35,8 +35,8 @@ class _Running:
 class ProgramPlayer:
     """Runs a program and secondary ones with the rights of the client that played them.
 
-    Their motions are ordinary ones with numbers and events. A client may pause them; stopping one ends the
-    program. A protective stop pauses the program; after unlocking, playing resumes with the interrupted move.
+    Motions of programs have numbers and events like those of clients. A client may pause a motion; stopping it ends
+    the program. A protective stop pauses the program; after unlocking, playing resumes with the interrupted move.
     """
 
     def __init__(self, access: Access, safety: SafetyControl) -> None:
@@ -77,7 +77,7 @@ class ProgramPlayer:
 
     @property
     def present_line(self) -> int:
-        """Line of the main thread in this tick, while `line` is updated at intervals; 0 for none."""
+        """Line of the main thread in this tick (`line` is updated only at intervals); 0 for none."""
         return 0 if self._main is None else self._main.machine.line
 
     @property
@@ -137,7 +137,7 @@ class ProgramPlayer:
 
     @property
     def _held(self) -> bool:
-        """Whether the program must wait: paused, in a safeguard stop, or before the drives are ready."""
+        """Whether the program must wait: it is paused, a safeguard stop is active, or the drives are not ready yet."""
         motion = self._motion
         unready = motion.robot_mode is RobotMode.RUNNING and not motion.ready
         return self.state != "PLAYING" or motion.safety.safeguard or unready
@@ -197,7 +197,7 @@ class ProgramPlayer:
         )
 
     def _finish(self, running: _Running) -> None:
-        """Handle the end of a program and stop its motion; `halt` ends all programs."""
+        """Handle the end of a program: stop its motion; if it has called `halt`, end all programs."""
         if running not in self._all:
             return
         halts = running.machine.halted

@@ -1,7 +1,7 @@
 """Sockets of programs: received data and waiting readers.
 
-The network is the host's. It gets orders after the programs' turns and reports `SocketNews` before a tick, which the
-journal contains, so that a replay gets the same bytes. A cell's gripper is simulated and answers a tick later.
+The host has the network: it takes orders after the programs' turns and reports `SocketNews` before a tick. The
+journal contains the news, so that a replay gets the same bytes. A cell's gripper is simulated; it answers a tick later.
 """
 
 from collections.abc import Callable, Generator, Iterator, Sequence
@@ -87,7 +87,7 @@ class Waited(NamedTuple):
 
 
 class Expire(NamedTuple):
-    """Report `expired` when this wall time has passed since the wait began; robot time has passed already."""
+    """Report `expired` once `seconds` of wall time have passed since the wait began; robot time has passed already."""
 
     wait: int
     socket: int
@@ -113,11 +113,11 @@ class _Socket:
     number: int
     received: bytearray = field(default_factory=bytearray)
     connected: bool | None = None  # true after opening, False after failing, None in between
-    open: bool = False  # whether it is connected
+    open: bool = False  # whether the socket is connected
     requests: Requests | None = None  # parser of requests to the cell's gripper; None for a network socket
 
     def shut(self) -> None:
-        """Mark as closed or failed."""
+        """Mark the socket as closed or failed."""
         self.connected, self.open = bool(self.connected), False
 
 
@@ -217,11 +217,11 @@ class Sockets:
     def read(
         self, name: str, take: Take[T], timeout: float, meanwhile: Callable[[int], None]
     ) -> Generator[None, None, T | None]:
-        """Read from a socket what `take` finds, waiting until it has arrived.
+        """Read from a socket what `take` finds; wait until that has arrived completely.
 
-        Incomplete data stays for the next call. A failed read returns None after at least a tick, so that loops let
-        time pass: on timeout, or if the socket was closed before. The timeout [s] counts robot time, but at least as
-        much wall time; none if not above 0. `meanwhile` is called with the ticks passed before each further tick.
+        Incomplete data stays for the next call. A read fails on timeout or if the socket was closed before; it returns
+        None after at least a tick, so that loops let time pass. The timeout [s] is over when both robot and wall time
+        have passed; 0 or less means none. `meanwhile` is called before each further tick with the ticks waited.
         """
         if (socket := self._named.get((self._owner(), name))) is None:
             yield
@@ -263,7 +263,7 @@ class Sockets:
 
     @contextmanager
     def _waiting(self, socket: _Socket) -> Iterator[int]:
-        """Wait for a socket within a context; return the number of the wait."""
+        """Context in which a program waits for a socket; yields the number of the wait."""
         self._last_wait = wait = self._last_wait + 1
         self._waits[wait] = False
         self._order(socket, Wait(wait, socket.number))

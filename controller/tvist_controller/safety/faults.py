@@ -91,7 +91,7 @@ class Faults:
 
     @property
     def next_end(self) -> float:
-        """Tick in which the next fault ends; infinite if none does."""
+        """Tick in which the next fault ends; infinite if no fault ends by itself."""
         return self._ends[0][0] if self._ends else math.inf
 
     def end(self, tick: float = math.inf) -> None:

@@ -1,4 +1,4 @@
-"""A robot with its own controller, whose reports become the state here, and whose safety state is obeyed."""
+"""A robot that its own controller moves: takes over that controller's reports and safety state."""
 
 import msgspec
 
@@ -39,7 +39,7 @@ class RemoteStatus:
         return 0 if self._sight is None else self._sight.missed
 
     def tell(self, sight: Sight, before: Sight | None) -> None:
-        """Emit warnings and take over the tool; `before` is the previous report."""
+        """Emit a report's warnings and take over its tool; `before` is the previous report."""
         for why in sight.told:
             self._emit("warning", why=why)
         if sight.tool is not None and (before is None or sight.tool != before.tool):
@@ -69,7 +69,7 @@ class RemoteStatus:
 
 
 class Watching(RemoteStatus):
-    """Follows a robot that is only watched."""
+    """Follows a robot that tvist only watches and does not move."""
 
     def __init__(
         self, plant: RealArm, peripherals: Peripherals, emit: Emit, cycle: ControlCycle, modes: RobotModes
@@ -79,7 +79,7 @@ class Watching(RemoteStatus):
         modes.now = int(RobotMode.DISCONNECTED), int(SafetyMode.UNDEFINED), int(RuntimeState.STOPPED)
 
     def look(self) -> int | None:
-        """Take the next report; return its tick, None without one; `tell_cycle` then emits the changes."""
+        """Take the next report and return its tick; None without a report. `tell_cycle` then emits the changes."""
         self._before = self._sight
         try:
             self._sight = self._plant.sight()
@@ -113,7 +113,7 @@ class Watching(RemoteStatus):
 
 
 class Supervision(RemoteStatus):
-    """Follows an arm that is moved through its manufacturer's controller; `motion` and `safety` are tvist's."""
+    """Follows an arm that tvist moves through the manufacturer's controller; `motion` and `safety` are tvist's own."""
 
     def __init__(
         self,
@@ -165,7 +165,7 @@ class Supervision(RemoteStatus):
             )
 
     def _obey(self, mode: int) -> None:
-        """Take over the robot's safety mode; protective stops come with the halt they cause."""
+        """Take over the robot's safety mode, except protective stops, which `Condition.halt` reports."""
         system = self._motion.safety
         system.safeguard = mode == SafetyMode.SAFEGUARD_STOP
         system.emergencies.clear()

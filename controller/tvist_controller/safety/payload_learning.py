@@ -30,7 +30,7 @@ from tvist_protocol.values import Payload
 
 LONGEST = 10_000  # longest recorded motion; longer ones are dropped [ticks]
 AFTER = 150  # recording time after the end of a motion, for the ring-down [ticks]
-WAITING = 16  # largest number of waiting studies; further motions teach nothing
+WAITING = 16  # largest number of waiting studies; further motions are not studied
 BLOCK = 10  # ticks averaged per block
 MIN_BLOCKS = 20  # smallest number of blocks of a motion
 UNKNOWN = {  # prior deviations per joint [-]
@@ -52,7 +52,7 @@ DRIFT = (0.2, 0.01)  # deviation due to changes since the last motion: mass [kg]
 LIGHT = 0.25  # mass below which the centre of mass is not estimated [kg]
 DEAD = 0.25  # smallest change of mass that is reported [kg]
 SURE_DEVIATIONS = 2.0  # number of standard deviations for a certain change [-]
-VAGUE = 0.35  # deviation of the mass above which a motion teaches nothing [kg]
+VAGUE = 0.35  # standard deviation of the mass above which a motion's estimate is not used [kg]
 PUSHED = 3.0  # mean squared residual relative to noise above which something else pushed the arm [-]
 
 
@@ -69,9 +69,9 @@ class MotionRecord:
 
 @dataclass
 class _Motion:
-    beliefs: FilterState  # assumed at its start
+    beliefs: FilterState  # state assumed by the controller at the motion's start
     samples: list[Sample] = field(default_factory=list)
-    stop: int = 0  # as in `MotionRecord`; 0 while it moves
+    stop: int = 0  # as in `MotionRecord`; 0 while the arm moves
     whole: bool = True
 
     def record(self) -> MotionRecord:
@@ -84,19 +84,19 @@ class _Motion:
 Later = Callable[[Callable[[], None]], Callable[[], bool]]
 """Starts a study outside the ticks; returns a function that tells whether it has ended."""
 Study = Callable[[MotionRecord], PayloadLesson | None]
-"""Returns what a motion teaches, None for nothing; called by one thread at a time. All results are in the
+"""Returns the lesson of a motion, None without one; called by one thread at a time. The journal contains all
 lessons, so a replay studies nothing."""
 Plans = Callable[[PayloadLesson, FilterState], Plan]  # plans the change that a lesson requires
 
 
 def at_once(work: Callable[[], None]) -> Callable[[], bool]:
-    """Study within the tick, which may take any time with the clocks lockstep and free."""
+    """Study within the tick, for the clocks lockstep and free, with which a tick may take any time."""
     work()
     return lambda: True
 
 
 class LessonRecord(NamedTuple):
-    """A lesson and what it depends on."""
+    """A lesson, and the controller's assumptions for which it is valid."""
 
     beliefs: FilterState  # state assumed by the controller during the motion
     lesson: PayloadLesson  # what was learnt
@@ -147,7 +147,7 @@ class PayloadLearning:
         self._under_way.append((self._later(study), learnt))
 
     def _record(self, sample: Sample, present: Callable[[], FilterState]) -> _Motion | None:
-        """Record a tick with drives on; return the motion it ends, if any; `present` is called at the start."""
+        """Record a tick with drives on; return the motion that ends in it, if any. A motion begins with `present()`."""
         resting, done, motion = sample.mode.at_rest, None, self._motion
         if not resting and (motion is None or motion.stop):
             done, motion = motion, _Motion(present())
@@ -159,14 +159,14 @@ class PayloadLearning:
             motion.samples.append(sample)
         if resting and not motion.stop:
             motion.stop = len(motion.samples)
-            if motion.stop > LONGEST:  # too long to teach anything: its samples take 20 MB
+            if motion.stop > LONGEST:  # too long to learn from: the samples would take 20 MB
                 self._motion = None
         if motion.stop and len(motion.samples) == motion.stop + AFTER:
             done, self._motion = motion, None
         return done
 
     def void(self) -> None:
-        """Drop all studies in progress, because of `forget` or another load."""
+        """Drop all studies in progress: they no longer apply after `forget` or another load."""
         self._under_way = []
 
     def lessons(self) -> Iterator[LessonRecord]:
@@ -213,7 +213,7 @@ class Equations:
     joints: int  # number n of joints
 
     def solve(self, prior: Estimate) -> Estimate | None:
-        """Return mass and centre of mass, given a prior about `at`; None if pushed, or not finite."""
+        """Return mass and centre of mass, given a prior around `at`; None if pushed, or if a value is not finite."""
         if not (np.isfinite(self.rows).all() and np.isfinite(self.measured).all()):
             return None
         mass, per_kg = float(self.at[0]), self.rows[:, 0]
@@ -255,7 +255,7 @@ class PayloadEstimator:
         self._believed: Payload | None = None
 
     def study(self, motion: MotionRecord) -> PayloadLesson | None:
-        """Return the carried payload if it certainly differs from the assumed one by more than `DEAD`."""
+        """Return the carried payload, if it certainly differs from the assumed one by more than `DEAD`, else None."""
         believed = motion.beliefs.declared
         if not motion.whole or len(motion.moments) < MIN_BLOCKS * BLOCK:
             return None
@@ -293,7 +293,7 @@ class PayloadEstimator:
         return PayloadLesson(payload=payload, why=why, beyond=beyond)
 
     def _equations(self, motion: MotionRecord, at: Floats) -> Equations:
-        """Return a motion's equations about a mass [kg] and centre of mass [m], shape (4,)."""
+        """Return a motion's equations, linearised at a mass [kg] and centre of mass [m], shape (4,)."""
         speeds = np.gradient(motion.q, PERIOD, axis=0)
         q, qd, measured = _means(motion.q), _means(speeds), _means(motion.moments)
         qdd, centre = np.gradient(qd, BLOCK * PERIOD, axis=0), at[1:]
@@ -336,7 +336,7 @@ def _means(values: Floats) -> Floats:
 
 
 def _each(values: Floats) -> list[Floats]:
-    """Return one column set per joint that contains only its values."""
+    """Return per joint a copy of the values (k, n) in which those of all other joints are zero."""
     return [values * (np.arange(values.shape[1]) == joint) for joint in range(values.shape[1])]
 
 

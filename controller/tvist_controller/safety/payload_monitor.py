@@ -90,7 +90,7 @@ class PayloadMonitor(Monitor):
         self._correlate(signals, np.zeros_like(self._sums))  # loads compiled code, which takes many ticks
 
     def declare(self, payload: Payload, ticks: int, *, found: bool = False, told: bool = False) -> None:
-        """Set another payload and discard measurements; `found` by the robot itself, `told` in a warning."""
+        """Set another payload and discard measurements; `found`: learnt by the robot; `told`: clients were warned."""
         self.payload = payload
         self._called = "assumed" if found else "declared"
         self._arm.chain[-2, BODY:] = self._arm.on_flange(Payload(mass=1.0, com=payload.com))
@@ -115,12 +115,12 @@ class PayloadMonitor(Monitor):
         return self._estimate(0)
 
     def _estimate(self, memory: int) -> tuple[float, float]:
-        """Return error and bound with `MEMORY` (0) or `RECENT` (1)."""
+        """Return the mass error and its bound [kg], over the time `MEMORY` (0) or `RECENT` (1)."""
         square, product, bound = self._sums[:, memory].tolist()
         return (0.0, np.inf) if square <= 0.0 else (product / square, bound / square)
 
     def look(self, sample: Sample) -> MonitorFinding | None:
-        """Return once that the payload cannot be right, until another is set."""
+        """Return, once per set payload, the finding that the payload cannot be right."""
         if self._wait > 0:
             self._wait -= 1
             return None
@@ -161,7 +161,7 @@ class PayloadMonitor(Monitor):
         )
 
     def _waits(self, at_rest: bool) -> bool:
-        """Add `TICKS_AVERAGED` ticks of doubt; return whether learning may still find the payload."""
+        """Count `TICKS_AVERAGED` more ticks of doubt; return whether learning may still find the payload."""
         span = TICKS_AVERAGED * PERIOD
         self._doubted += span
         self._moved = self._moved or not at_rest

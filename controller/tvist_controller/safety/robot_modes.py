@@ -13,7 +13,7 @@ _KEEP_POWER = frozenset({SafetyMode.PROTECTIVE_STOP, SafetyMode.SAFEGUARD_STOP})
 
 
 class RobotModes:
-    """The robot's modes, updated when they may have changed, and the stop that blocks it."""
+    """The robot's modes, updated when they may have changed, and the stop that blocks the robot."""
 
     def __init__(self, motion: MotionControl) -> None:
         self._motion = motion
@@ -43,7 +43,7 @@ class RobotModes:
 
     @property
     def stop_reason(self) -> StopReason | None:
-        """The stop that blocks the robot, or cut the power still off; None without one or its event."""
+        """The stop that blocks the robot or has switched its power off; None without one, or without its event."""
         robot, safety, event = self._motion.robot_mode, self._motion.safety_mode, None
         if safety not in _MAY_MOVE:
             event = self.stops.get(safety)
@@ -54,7 +54,7 @@ class RobotModes:
 
 
 def _cause(event: Event, mode: SafetyMode) -> SafetyMode | None:
-    """Return the safety mode that an event explains, NORMAL for a mere loss of power, None if unknown."""
+    """Return the safety mode whose cause an event is, NORMAL for a mere loss of power, None if unknown."""
     if event.kind == "protective_stop":
         return SafetyMode.PROTECTIVE_STOP
     if event.category == 2:

@@ -36,7 +36,7 @@ class SafetyControl:
         self._resumes_by_itself = False  # whether a motion paused by a safeguard resumes when it is released
 
     def reduce(self, *, reduced: bool) -> None:
-        """Slow motions down or end that; stop a stream, since its client determines its speed."""
+        """Begin or end reduced speed; stop a stream that may be too fast, since its client determines the speed."""
         motion, system = self._motion, self._motion.safety
         if reduced == system.reduced:
             return
@@ -49,7 +49,7 @@ class SafetyControl:
         self._emit("warning", why=f"safety_mode is {motion.safety_mode.name}: speed is {share}")
 
     def safeguard(self, *, stopped: bool) -> None:
-        """Stop with category 2 (pause a motion, end a stream), or release that."""
+        """Begin or end a safeguard stop of category 2, which pauses a motion and ends a stream."""
         motion, system = self._motion, self._motion.safety
         if stopped == system.safeguard:
             return
@@ -61,7 +61,7 @@ class SafetyControl:
             return
         why = "a safeguard asked for a stop"
         if not motion.activity.moving:
-            # Nothing moves or ends, but this now blocks motion.
+            # No motion ends, but from now on the safeguard blocks motion.
             self._emit("safety_stop", why=why, category=2, duration=0.0, way=0.0)
             return
         if after(motion.activity, "pause") is None:
@@ -73,7 +73,7 @@ class SafetyControl:
         self._emit("safety_stop", why=why, category=2, duration=duration, way=way)
 
     def stay_paused(self) -> None:
-        """Make a paused motion wait for the client's `resume`."""
+        """Keep a motion paused until the client's `resume`, even if the safeguard stop ends before."""
         self._resumes_by_itself = False
 
     def emergency(self, whose: Emergency) -> None:
@@ -102,7 +102,7 @@ class SafetyControl:
         motion.go(trigger)
 
     def _hold(self) -> None:
-        """Start the line where the arm stands before it is held; raise RefusalError if that is impossible."""
+        """Before the drives hold the arm, start the line at its position; raise RefusalError if that is impossible."""
         try:
             self._begin_where_it_stands()
         except ValueError as error:
@@ -113,7 +113,7 @@ class SafetyControl:
     def _begin_where_it_stands(self) -> None:
         """Start the line at the position of an arm that cannot be placed; raise ValueError if unknown.
 
-        Without power it may have been moved, brakes stop it anywhere, and it sinks until its drives hold it.
+        Its position may differ from the line's: without power it may be moved or sink, and brakes stop it anywhere.
         """
         cycle = self._motion.cycle
         if not isinstance(cycle.plant, SimulatedArm):
@@ -147,7 +147,7 @@ class SafetyControl:
                 monitor.restart()
 
     def watch(self, sample: Sample) -> None:
-        """Warn or stop the arm according to the monitors of the latest tick."""
+        """Let the monitors check the latest tick; warn or stop the arm according to their findings."""
         motion = self._motion
         held = motion.robot_mode is RobotMode.RUNNING
         if held and not self._held:
@@ -175,7 +175,7 @@ class SafetyControl:
             monitor.restart()
 
     def watch_power(self, sample: Sample) -> None:
-        """Stop an arm that reports trouble, and restart the line where one is about to be held."""
+        """Stop an arm that reports trouble. If the drives have just begun to hold the arm, restart the line there."""
         motion = self._motion
         if motion.power is not None:
             held = motion.power.halted is None
@@ -200,9 +200,9 @@ class SafetyControl:
         self._emit("protective_stop" if protective else "safety_stop", why=halt.why)
 
     def recover(self, error: PlantError, seed: int) -> Sample:
-        """Recover from a failed arm: place a simulated one at rest at its reference, in a protective stop.
+        """Recover from a failed arm: place a simulated arm at rest at its reference, in a protective stop.
 
-        One that cannot be placed, or fails again at once, stays without power until the safety system is restarted.
+        An arm that cannot be placed, or fails again at once, has no power until the safety system is restarted.
         """
         motion, cycle = self._motion, self._motion.cycle
         placed = isinstance(cycle.plant, SimulatedArm)
@@ -231,7 +231,7 @@ class SafetyControl:
         return sample
 
     def put(self, mode: ResetMode | None) -> None:
-        """Set the robot mode after a reset; None for the present mode, at rest."""
+        """Set the robot mode after a reset; None keeps the present mode, at rest."""
         motion = self._motion
         if mode is not None:
             motion.activity = PUT[mode]

@@ -61,7 +61,7 @@ class ModeSource:
 
 
 def first_source(description: RobotDescription, calibration: Calibration | None) -> ModeSource:
-    """Return a robot's initial source of modes; without calibration, before identification, a fixed one."""
+    """Return a robot's initial source of modes; without calibration (before identification), fixed modes."""
     if calibration is None:
         return ModeSource("fixed", description, f_d=(10.0,), zeta=(0.2,))
     name: SourceName = "modal" if calibration.polynomial is None else "polynomial"
@@ -69,7 +69,7 @@ def first_source(description: RobotDescription, calibration: Calibration | None)
 
 
 def modal_source(description: RobotDescription, calibration: Calibration | None) -> ModeSource | None:
-    """Return a robot's source `modal`, from its calibration or one of the package; None without any."""
+    """Return a robot's source `modal`, from its calibration or one of the package; None without either."""
     if calibration is None:
         return None
     for one in (calibration, *map(load, available())):

@@ -16,7 +16,7 @@ _FILE = re.compile(r"(?P<file>.*\.py)(?::(?P<attribute>.*))?", re.DOTALL)
 
 
 class OwnFileError(ValueError):
-    """A shaper or plant does not exist or cannot be made; the message states place and reason."""
+    """A shaper or plant does not exist or cannot be made; the message states FILE.py:NAME and the reason."""
 
 
 class OwnFile(NamedTuple):
@@ -34,7 +34,7 @@ def is_file(place: str) -> bool:
 
 
 def ends(failure: BaseException) -> bool:
-    """Return whether an exception is a signal's own kind of SystemExit, which must end the process."""
+    """Return whether an exception was raised by a signal (a subclass of SystemExit) and must end the process."""
     return isinstance(failure, SystemExit) and type(failure) is not SystemExit
 
 

@@ -47,7 +47,7 @@ class OwnPlant:
         return RecordedPlant(self.place, self.sha256)
 
     def make(self, description: RobotDescription, carried: Payload, seed: int = 0) -> Plant:
-        """Make the plant for a robot with its carried payload, as known to the server; raise OwnFileError.
+        """Make the plant for the server's description and carried payload; raise OwnFileError if that fails.
 
         Only plants of `VARIANTS` use the seed.
         """

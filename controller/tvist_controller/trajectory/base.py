@@ -1,4 +1,4 @@
-"""Bases of references: limits, paths of planned motions, trajectories, and the trivial ones."""
+"""Bases of references: limits, paths of planned motions, trajectories, and the simplest trajectories."""
 
 import copy
 from abc import ABC, abstractmethod
@@ -39,7 +39,7 @@ class CheckedMotion(NamedTuple):
 class Path(ABC):
     """Joint positions q(x) as a function of a parameter x.
 
-    Time laws, the TVIST filter and stops act on the parameter, so results stay on any path. The parameter has
+    Time laws, the TVIST filter and stops act on the parameter, so their results stay on the path. The parameter has
     shape (m,) and goes straight from `start` to `end`, in radians for a straight line in joint space, in
     metres for a tool path.
     """
@@ -63,15 +63,15 @@ class Path(ABC):
 
     @abstractmethod
     def paced(self, x: Floats, xd: Floats, xdd: Floats, acceleration: float) -> Floats:
-        """Return velocities and accelerations for rate changes, shape (2, k).
+        """Return velocities and accelerations that limit changes of the time rate, shape (2, k).
 
-        They are scaled so that `acceleration`, the parameter's limit [1/s^2], applies to every column. ẋ
-        [1/s] and ẍ [1/s^2] are those at full rate, each of shape (m,).
+        They are scaled so that `acceleration`, the parameter's limit [1/s^2], is the limit of every column. `xd`
+        [1/s] and `xdd` [1/s^2] are ẋ and ẍ at full rate, each of shape (m,).
         """
 
     @abstractmethod
     def keeping(self, limits: MotionLimits, velocity: float, x: Floats) -> MotionLimits | None:
-        """Return the parameter's limits in a stop from x, (m,), at up to `velocity` [1/s]; None for none."""
+        """Return limits of the parameter for a stop from x, (m,), at up to `velocity` [1/s]; None if there are none."""
 
     @abstractmethod
     def way(self, start: Floats, end: Floats) -> CheckedMotion:
@@ -116,18 +116,18 @@ class JointLine(Path):
 
 @dataclass(frozen=True)
 class BrakingForecast:
-    """When and how hard a trajectory will brake, in its path's parameter, as known without simulation."""
+    """When and how hard a trajectory will brake, in terms of its path's parameter, as known without simulation."""
 
     path: Path  # path of the trajectory
     end: Floats  # parameter at its uninterrupted end, shape (m,) [rad]
     braking: float  # largest future deceleration of the leading entry [rad/s^2]
     jerk: float  # largest future jerk of the leading entry [rad/s^3]
-    steady: float  # time before it starts braking, 0 if unknown [s]
-    turns: bool = False  # whether it may turn back on its path
+    steady: float  # time before the trajectory starts braking, 0 if unknown [s]
+    turns: bool = False  # whether the trajectory may turn back on its path
 
 
 class Trajectory(ABC):
-    """A reference with one sample per tick: its path's parameter, or joint positions without a path."""
+    """A reference with one sample per tick: the parameter of its path or, without a path, joint positions."""
 
     path: Path | None = None
     """Path of the trajectory; None if joints move independently, as in streams and joint stops."""
@@ -147,20 +147,20 @@ class Trajectory(ABC):
         """Whether the last sample was the final one; all later ones are equal."""
 
     def adapt(self, reduced_limits: Callable[[MotionLimits | None], MotionLimits]) -> None:  # noqa: B027  most need not
-        """Leave room for a new filter; needed only by references without a plan.
+        """Reduce the limits for a new filter; only references without a plan need this.
 
-        `reduced_limits(limits)` returns limits of a reference whose shaped reference keeps these and the arm's limits
-        (None: only the arm's).
+        `reduced_limits(limits)` returns limits for the reference with which the shaped reference keeps `limits` (None:
+        no such limits) and the arm's limits.
         """
 
     @property
     def standing(self) -> bool:
-        """Whether samples stay equal until a command: finished or paused."""
+        """Whether samples stay equal until a command comes: the trajectory has finished or is paused."""
         return self.finished
 
     @property
     def forecast(self) -> BrakingForecast | None:
-        """Forecast of its motion; None without a path."""
+        """Forecast of the motion; None without a path."""
         return None
 
     def fork(self) -> Self:
@@ -205,5 +205,5 @@ class SampledPositions(Trajectory):
 
     @property
     def finished(self) -> bool:
-        """Whether it has reached the last position."""
+        """Whether the last position has been reached."""
         return self._ticks == len(self._positions) - 1

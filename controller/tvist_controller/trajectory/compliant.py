@@ -1,4 +1,4 @@
-"""A reference that complies with forces at the tool, while another moves it in the other directions."""
+"""A reference that complies with forces at the tool in some axes; in the others, another reference moves the tool."""
 
 import math
 from collections.abc import Callable
@@ -14,10 +14,10 @@ from tvist_controller.trajectory.limiter import TorqueMargin
 from tvist_controller.trajectory.speed import abrupt
 from tvist_plant.plant import PERIOD
 
-NEWTON = 3  # newton steps from tool pose to joint angles; two suffice for the travel of a tick
+NEWTON = 3  # Newton steps from tool pose to joint angles; two suffice for the travel of a tick
 OFF = 1e-5  # pose error in a stiff direction above which the motion cannot continue [m or rad]
 FASTEST = 0.5  # fraction of joint velocity available to compliance [-]
-CRAWL = 0.05  # fraction of it below which a singular posture counts as hindering compliance [-]
+CRAWL = 0.05  # fraction of the force law's velocity below which a singular posture nearly blocks the arm [-]
 LEVER = 0.22  # length equivalent to a turn by 1 rad; its square scales virtual inertias and dampings [m]
 MASS = 70.0  # virtual mass M [kg]; the time constant M/D keeps the arm's elasticity out of the loop
 FREE_DAMPING = 2000.0  # damping in free space at damping parameter 1 [N s/m]
@@ -47,8 +47,8 @@ def compliant_velocity(task: ForceTask, velocity: Floats, felt: Floats) -> Float
     """Return the velocity of the frame's axes a tick later, shape (6,) [m/s, rad/s].
 
     A compliant axis is a virtual mass with damping, M v̇ = g (w + f) - D v, with wanted wrench w, measured
-    wrench f (6,) [N, N m] and gain g, integrated implicitly, so any damping is stable. In contact D is at
-    least that of contact. A stiff axis loses the speed of its compliance.
+    wrench f (6,) [N, N m] and gain g, integrated implicitly, so any damping is stable. In contact, D rises to at
+    least `contact_damping`. An axis that has become stiff loses its earlier compliant velocity gradually.
     """
     scale = np.repeat([1.0, LEVER * LEVER], 3)
     touched = np.minimum(np.abs(felt) / np.repeat([CONTACT, CONTACT * LEVER], 3), 1.0)
@@ -63,14 +63,14 @@ def compliant_velocity(task: ForceTask, velocity: Floats, felt: Floats) -> Float
 
 
 class Compliant(LimitedFollower):
-    """Moves the tool by force control in compliant axes, and as another reference does in stiff ones.
+    """Moves the tool by force control in compliant axes, and as an inner reference does in stiff axes.
 
-    The tracked pose P is integrated from twists along the task's axes: the force law's velocity where compliant, that
-    of the inner reference's tool elsewhere. The joints follow P by Newton's method and a `Limiter`. Compliance that
-    joint limits or singular postures prevent is dropped from P, so that nothing is caught up later.
+    A pose P is integrated from velocities along the task's axes: in compliant axes the force law's, in stiff axes that
+    of the inner reference's tool. The joints follow P by Newton's method and a `Limiter`. If joint limits or singular
+    postures prevent a compliant motion, it is removed from P, so that nothing is caught up later.
     """
 
-    finished = False  # it ends by a command
+    finished = False  # a compliant motion ends by a command
 
     def __init__(
         self,
@@ -116,7 +116,7 @@ class Compliant(LimitedFollower):
 
     @property
     def task(self) -> ForceTask:
-        """The task."""
+        """The present task."""
         assert self._task is not None, "it is aimed before it moves"
         return self._task
 
@@ -135,7 +135,7 @@ class Compliant(LimitedFollower):
         super().adopt(abrupt(limits))
 
     def pace(self, speed: float, slowest: float | None) -> None:
-        """Set the speed of the inner reference, and the velocity limit of both."""
+        """Set the speed of the inner reference, and the velocity limit of inner and compliant reference."""
         self._speed = speed, slowest
         self.inner.pace(speed, slowest)
         super().pace(speed, slowest)
@@ -174,7 +174,7 @@ class Compliant(LimitedFollower):
         return reached
 
     def _move_inner(self) -> Floats:
-        """Advance the inner reference by a tick; return its tool velocity, shape (6,)."""
+        """Advance the inner reference by a tick; return the tool velocity that it commands, shape (6,)."""
         if self.inner.finished:
             self._moved = np.zeros(6)
             return self._moved
@@ -187,7 +187,7 @@ class Compliant(LimitedFollower):
         return turned(pose[0], way[3:]), pose[1] + way[:3]
 
     def _drop(self, q: Floats, axes: Floats) -> None:
-        """Drop what the joints did not follow in compliant axes."""
+        """Remove from the tracked pose the compliant motion that the joints did not follow."""
         rotation, position = self.kinematics.pose(q)
         off = np.concatenate((self._pose[1] - position, turn(rotation, self._pose[0])))
         lost = np.where(self.task.compliant > 0.0, _into(axes, off), 0.0)

@@ -16,8 +16,8 @@ LOOKAHEAD = (0.03, 0.2)  # range of the time constant [s]
 GAIN = (100.0, 2000.0)  # range of the gain [1/s^2]
 DAMPED = 3.0  # smallest gain times squared lag: damping 0.87, overshoot 0.4 % [-]
 DELAY = 1.5
-"""Ticks by which T exceeds the lookahead. With half a tick because postures are held for one, `target_q` lags
-by the lookahead plus two ticks, one of them in the differentiator."""
+"""Ticks by which T exceeds the lookahead. Each posture is held for a tick, which adds half a tick. So `target_q`
+lags by the lookahead plus two ticks, one of which is the differentiator's."""
 THERE = 1e-7  # distance, and change per tick, below which the posture is reached [rad]
 
 
@@ -51,7 +51,7 @@ class Guided(Trajectory):
 
 
 class LimitedFollower(Guided):
-    """Passes a client's signal, timed by the client, through a `Limiter`; reduced mode limits velocity."""
+    """Passes a client's signal through a `Limiter`. The client sets the timing; reduced mode limits only velocity."""
 
     def __init__(
         self,
@@ -79,7 +79,7 @@ class LimitedFollower(Guided):
         self._follow(self.state)
 
     def pace(self, speed: float, slowest: float | None) -> None:
-        """Set the reported speed and the velocity limit."""
+        """Set the speed that is only reported, and the velocity limit."""
         self.rate = speed
         velocity = self._arm.velocity if slowest is None else min(slowest, self._arm.velocity)
         if velocity != self.limits.velocity:
@@ -132,7 +132,7 @@ class ServoFollower(LimitedFollower):
 
     @property
     def finished(self) -> bool:
-        """Whether it rests at the posture."""
+        """Whether the reference rests at the posture."""
         return bool((self._limiter.q == self._posture).all()) and self._limiter.resting
 
 

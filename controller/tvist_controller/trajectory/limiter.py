@@ -37,7 +37,7 @@ def judge(
     now: Floats,  # result: differences, shape (4, n)
     fits: Bools,  # result: which joints fit, shape (n,)
 ) -> int:
-    """Find the joints whose differences are and can stay within limits; return the sum of `FIT` and `FAR`."""
+    """Find the joints whose differences keep limits now and can later; return `FIT`, `FAR`, their sum, or 0."""
     fastest = (1.0 + TOLERANCE) * velocity + ROUNDING
     hardest = (1.0 + TOLERANCE) * acceleration + 2.0 * ROUNDING
     harshest = (1.0 + TOLERANCE) * jerk + 4.0 * ROUNDING
@@ -74,7 +74,7 @@ def judge(
 
 
 class TorqueMargin(Protocol):
-    """Motion that joint torques permit."""
+    """Tells which motion the joint torques permit."""
 
     def allows(self, q: Floats, qd: Floats, qdd: Floats) -> bool:
         """Return whether a state keeps the permitted torques."""
@@ -113,15 +113,15 @@ class Limiter:
         self._reach = np.array(reach, dtype=float)
         self._torque = torque
         self.q = np.array(q, dtype=float)  # position of the reference, shape (n,) [rad]
-        # Velocity of the signal; differences of the reference, and its second difference a tick earlier.
+        # Velocity of the signal; second difference of the reference a tick earlier; present differences.
         self._signal_qd, self._bend_before, self._now = qd, PERIOD * PERIOD * qdd, np.zeros((DIFFERENCES, n))
         self._now[STEP], self._now[BEND] = PERIOD * (qd - 0.5 * PERIOD * qdd), self._bend_before
         self._state: Floats | None = np.stack(
             state
-        )  # derivatives, if they differ from those of the differences
+        )  # position and derivatives of the reference, if these differ from its differences
         self._behind: Bools | None = None  # which joints are not on the signal, if any
         self.behind = 0.0  # lag of joints that cannot catch up with a signal at its limits [s]
-        # Within this position, no state within the limits needs a check of the range.
+        # At positions smaller than this, no state within the limits needs a check of the range.
         slow = limits.acceleration if torque is None else min(limits.acceleration, HEAVY)
         ramp, swing = limits.acceleration / limits.jerk, limits.velocity / slow
         lasting = max(swing + ramp, 2.0 * math.sqrt(limits.velocity / limits.jerk))
@@ -178,7 +178,7 @@ class Limiter:
         return q, qd, qdd
 
     def _passed(self, q: Floats, now: Floats, bend_before: Floats | None = None) -> Floats:
-        """Return the state (3, n) of joints on the signal, from the cubic through the last four positions."""
+        """Return the state (3, n) of joints exactly on the signal, from the cubic through the last four positions."""
         h, limit, step, bend = PERIOD, self._limits.acceleration, now[STEP], now[BEND]
         change = bend - (self._now[BEND] if bend_before is None else bend_before)
         mean = bend / (h * h)
@@ -187,7 +187,7 @@ class Limiter:
         return np.stack((q, step / h + h * (mean / 6.0 + qdd / 3.0), qdd))
 
     def _meets(self, qd: Floats, now: Floats) -> Bools:
-        """Return the joints that can continue on the signal within limits if placed there now."""
+        """Return the joints that, if they were placed on the signal now, could follow it within limits."""
         h, limits, step, bend = PERIOD, self._limits, now[STEP], now[BEND]
         signal = self._signal_acceleration(qd, limits.acceleration)
         following = (qd - step / h) / h + 0.5 * signal  # second difference at the next tick
@@ -197,13 +197,13 @@ class Limiter:
         return meets
 
     def _accelerations(self) -> tuple[float, float]:
-        """Return the permitted acceleration now, and one that certainly allows a stop [rad/s^2]."""
+        """Return the acceleration permitted now, and one with which a stop is certainly possible [rad/s^2]."""
         limit = self._limits.acceleration
         room = math.inf if self._torque is None else self._torque.acceleration(*self.state[:2])
         return min(limit, room), min(limit, STOPS * room)
 
     def _stoppable(self, state: Floats, limit: float) -> Bools:
-        """Return the joints that can stop in range with an acceleration, two ticks to spare."""
+        """Return the joints that could still stop in range at `limit` [rad/s^2] if they started two ticks later."""
         (q, qd, qdd), jerk = state, self._limits.jerk
         sign = np.sign(qd)
         speed, rise = np.abs(qd), sign * qdd
@@ -232,7 +232,7 @@ class Limiter:
         return np.asarray(np.clip((qd - self._signal_qd) / PERIOD, -most, most))
 
     def _held_back(self, q: Floats, qd: Floats, passed: Floats, fits: Bools) -> tuple[Floats, Bools]:
-        """Return the state (3, n) if not all joints pass unchanged, and which do."""
+        """Return the state (3, n) when not all joints pass the signal unchanged, and which joints do."""
         limits, (limit, sure) = self._limits, self._accelerations()
         state = passed if fits.all() else np.where(fits, passed, self._catch_up(q, qd, limit, fits))
         if self._torque is not None and not self._torque.allows(*state):
@@ -255,7 +255,7 @@ class Limiter:
         return state, fits
 
     def _catch_up(self, q: Floats, qd: Floats, limit: float, fits: Bools) -> Floats:
-        """Return the state (3, n) a tick later when catching up with a signal of constant acceleration."""
+        """Return the state (3, n) a tick later while joints catch up with a signal of constant acceleration."""
         request, limits, h = self._catch_request, self._limits, PERIOD
         fastest = (1.0 - self.ADVANTAGE) * limits.velocity
         present = self.state
@@ -272,7 +272,7 @@ class Limiter:
         request.max_acceleration = (limit - qdd).tolist()
         request.min_acceleration = (-limit - qdd).tolist()
         relative = _after_a_tick(self._catcher, request)
-        if relative is None:  # it would take more than 7600 s
+        if relative is None:  # catching up would take more than 7600 s
             return self._change_to(np.zeros_like(q), limit)
         return np.stack((q, qd, qdd)) + relative
 

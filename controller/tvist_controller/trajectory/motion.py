@@ -42,14 +42,14 @@ class TimeScaling:
         return other
 
     def steady(self, target: float) -> bool:
-        """Return whether the rate stays at its target."""
+        """Return whether the rate has reached the target and stays there."""
         return self.rate == target and self._slope == 0.0
 
     def advance(self, target: float, curve: Sequence[Floats]) -> float:
         """Advance by one tick towards a target rate [-]; return the time that passes on the path [s].
 
-        `curve` has q' [rad/s] and q'' [rad/s^2], each (2, n), at the present point and just ahead; the rate
-        must suit both, since a tick has finite length.
+        `curve` has q' [rad/s] and q'' [rad/s^2], each (2, n), at the present point and just ahead; the change
+        of rate must keep the limits at both points, since the motion passes from one to the other in the tick.
         """
         rooms = [self._room(qd, qdd) for qd, qdd in curve]
         # ruckig requires limits on both sides of zero, so leave a little room in both directions.
@@ -93,8 +93,8 @@ class DoubleS:
     """Time-optimal motion from rest to rest within limits, shape (m,) [rad], all entries in phase.
 
     The entry with the longest distance determines the duration (Biagiotti and Melchiorri 2008, ch. 3.4). With
-    the paper's 1.5 rad/s, 2.0 rad/s² and 100 rad/s³, acceleration ramps last 20 ms. Raise ValueError if it
-    would last for hours.
+    the paper's 1.5 rad/s, 2.0 rad/s² and 100 rad/s³, acceleration ramps last 20 ms. Raise ValueError if the
+    motion would last for hours.
     """
 
     def __init__(self, start: Floats, end: Floats, limits: MotionLimits) -> None:
@@ -114,11 +114,11 @@ class DoubleS:
                 f"velocity {limits.velocity:g}, acceleration {limits.acceleration:g}, jerk {limits.jerk:g}"
             ) from error
         self.limits = limits
-        self.begins = 0.0  # time from which it is known [s]
+        self.begins = 0.0  # time from which the law is known [s]
         self.duration = float(self._trajectory.duration)  # duration from rest to rest [s]
         # Motion from rest to rest is symmetric in time.
         leading = self._trajectory.profiles[0][int(np.argmax(np.abs(end - start)))]
-        self.brakes_at = self.duration - sum(leading.t[:3])  # time at which it starts braking [s]
+        self.brakes_at = self.duration - sum(leading.t[:3])  # time at which the motion starts braking [s]
         self.moments: Floats = np.cumsum(leading.t)
         """Times at which the jerk changes, with possibly largest velocity or acceleration [s]."""
 
@@ -131,8 +131,8 @@ class DoubleS:
 class PlannedMotion(Trajectory):
     """A planned motion from rest to rest.
 
-    Samples are the path's parameter; on a straight line in joint space, joint positions. Limits of a rate
-    change are at least those of the law, which may be slow.
+    Samples are the path's parameter; on a straight line in joint space, these are joint positions. Rate changes
+    may use `agility`, or at least the limits of the law, which may itself be slow.
     """
 
     path: Path
@@ -155,7 +155,7 @@ class PlannedMotion(Trajectory):
         self._since, self._ticks = 0.0, 0
 
     def time_at(self, share: float) -> float:
-        """Return the time at full speed at which a fraction of the way, 0 to 1, is completed [s]."""
+        """Return the time [s], at full speed, at which the motion has covered a fraction of the way, 0 to 1."""
         early, late = self.law.begins, self.duration
         for _ in range(40):
             middle = 0.5 * (early + late)
@@ -177,7 +177,7 @@ class PlannedMotion(Trajectory):
         )
 
     def next(self) -> Floats:
-        """Advance by one tick and return the parameter, exactly the path's end from the end time on."""
+        """Advance by one tick and return the parameter; from the end time on, this is exactly the path's end."""
         if self._pace.steady(self.speed):
             self._ticks += 1
         else:
@@ -190,7 +190,7 @@ class PlannedMotion(Trajectory):
         return self.path.end if time >= self.duration else np.array(self.law.at(time)[0])
 
     def go_on(self, longer: "PlannedMotion") -> None:
-        """Continue as a longer motion along a `SplineCurve`, equal until now and for some ticks."""
+        """Continue as a longer motion along a `SplineCurve` that is equal until some ticks from now."""
         assert isinstance(self.path, SplineCurve)
         assert isinstance(longer.path, SplineCurve)
         self.path.become(longer.path)
@@ -205,12 +205,12 @@ class PlannedMotion(Trajectory):
 
     @property
     def standing(self) -> bool:
-        """Whether it has reached its end, or is paused and stands."""
+        """Whether the motion has reached its end, or is paused and stands still."""
         return self.finished or (self.rate == 0.0 and self.steady)
 
     @property
     def forecast(self) -> BrakingForecast:
-        """Forecast of its motion; the time of braking is known only at constant rate."""
+        """Forecast of the motion; the time of braking is known only at constant rate."""
         time, rate = self.time, self._pace.rate
         known = rate > 0.0 and self.steady
         limits = self.limits if self.steady else self.agility
@@ -224,7 +224,7 @@ class PlannedMotion(Trajectory):
 
     @property
     def steady(self) -> bool:
-        """Whether its rate has reached the target."""
+        """Whether the rate has reached its target."""
         return self._pace.steady(self.speed)
 
     @property
@@ -235,8 +235,8 @@ class PlannedMotion(Trajectory):
     def hold(self, acceleration: float) -> bool:
         """Pause the motion if it then stands noticeably sooner; return whether it pauses.
 
-        Near the end hardly any acceleration is left for a pause, which would only take longer. `acceleration`
-        is the limit for every entry of the parameter while slowing down, at most that of `agility`.
+        Near its end a motion already brakes and leaves little acceleration for a pause, which would take longer. Every
+        entry of the parameter slows down with at most `acceleration`, which must not exceed that of `agility`.
         """
         paused = self.fork()
         paused.speed, paused._pace.acceleration = 0.0, acceleration  # noqa: SLF001  one of its own kind
@@ -244,7 +244,7 @@ class PlannedMotion(Trajectory):
         longer = self.velocity * (1.0 / acceleration - 1.0 / most) + 2.0 * most / self.limits.jerk
         hardest = self.agility.acceleration <= most
         if forecast.steady == 0.0 and self.rate == 1.0 and self.steady and hardest:
-            return False  # it brakes as hard as it can
+            return False  # the motion already brakes as hard as it can
         if forecast.steady < longer + SURELY and not _stands_sooner(paused, self.fork()):
             return False
         self.speed, self._pace.acceleration = 0.0, acceleration
@@ -261,7 +261,7 @@ class PlannedMotion(Trajectory):
         return other
 
     def paced_at(self, rate: float) -> Self:
-        """Return a copy that has not started, at another rate [-]."""
+        """Return a copy of a motion that has not started, at another rate [-]."""
         other = self.fork()
         other.speed, other._pace = rate, TimeScaling(self.agility, rate)  # noqa: SLF001  one of its own kind
         return other
@@ -273,7 +273,7 @@ class PlannedMotion(Trajectory):
 
     @property
     def finished(self) -> bool:
-        """Whether it has reached its end."""
+        """Whether the motion has reached its end."""
         return self.time >= self.duration
 
 
@@ -282,7 +282,7 @@ def quickest_motion(
 ) -> PlannedMotion:
     """Return the double-S motion along a path from rest to rest within limits of its parameter.
 
-    Speed and agility are those of `PlannedMotion`. Raise ValueError if it would last for hours.
+    For `speed` and `agility` see `PlannedMotion`. Raise ValueError if the motion would last for hours.
     """
     return PlannedMotion(path, DoubleS(path.start, path.end, limits), speed, agility)
 

@@ -13,18 +13,18 @@ SPARE_PERIODS = 1  # additional delay of a stream slower than the tick, for jitt
 SLACK = 0.3  # tolerated excess delay, which avoids constant changes [periods]
 SHARE = 0.05  # fraction of the limits available to a change of delay [-]
 CALM = 0.5  # time after which a delay required by the limits is reduced if no longer needed [s]
-SLOW_SHARE = 0.05  # fraction of the velocity limit below which the stream must be for that [-]
+SLOW_SHARE = 0.05  # fraction of the velocity limit below which the delay may be reduced [-]
 CLOSE = 1e-6  # difference below which the delay equals its target [ticks]
 
 
 class PlayOut:
     """Position of a stream to play at each tick, in sequence numbers.
 
-    The sender's clock may differ, and transport delay varies. The lateness of set-point k is the tick before which it
-    arrived minus k periods. Play-out waits for the latest of recent set-points, but not much longer than the earliest
-    needs. So it compensates jitter, follows a slow or fast clock, and does not wait for gaps. The delay D approaches
+    The sender's clock may differ, and transport delay varies. If set-point k arrives before tick i, its lateness is i
+    minus k periods. The play-out delay D suits the latest of recent set-points, but is not much longer than the
+    earliest needs. So play-out compensates jitter, follows a slow or fast clock, and does not wait for gaps. D follows
     its target through three first-order lags, without overshoot. With stream velocity q', q̈ contains -q' D̈; the lags'
-    time constant, zero at rest, limits this term and its jerk to a fraction of the limits.
+    time constant, zero at rest, keeps this term and its jerk within a fraction of the limits.
     """
 
     def __init__(
@@ -47,7 +47,7 @@ class PlayOut:
 
     @property
     def delay(self) -> float:
-        """Time from arrival of the earliest set-points to their play-out [ticks]."""
+        """Time from arrival to play-out of the set-points that come earliest relative to their number [ticks]."""
         return self._lags[2] - self._earliest
 
     @property
@@ -57,7 +57,7 @@ class PlayOut:
         return self._origin, round((self._now - self._lags[2]) / self._ticks, 9)
 
     def breaks(self, sequence: int) -> bool:
-        """Return whether a set-point that arrived before the coming tick is far from its expected time."""
+        """Return whether a set-point that arrives for the coming tick is far from its expected time."""
         return abs(self._lateness(sequence) - self._earliest) > self._most
 
     def _lateness(self, sequence: int) -> float:
@@ -82,7 +82,7 @@ class PlayOut:
             self._wanted = wanted
 
     def advance(self, speed: float, behind: float) -> None:
-        """Advance by one tick at the fastest joint's velocity [rad/s]; `behind`: the reference's lag [s]."""
+        """Advance by one tick; `speed` is the fastest joint's velocity [rad/s], `behind` the reference's lag [s]."""
         self._now += 1
         delay = self._lags[2]
         if behind > 0.0:

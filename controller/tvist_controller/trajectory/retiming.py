@@ -2,7 +2,7 @@
 
 In the phase plane of s and b = ṡ², constant acceleration is a straight line, db/ds = 2 s̈. A backward and a forward
 pass through the curve's cells find the largest permitted b (Bobrow, Dubowsky and Gibson 1985, with bounds independent
-of the sign of s̈). Its acceleration has steps; the moving mean of s(t) over `ramp` seconds has none, and bounded jerk.
+of the sign of s̈). This motion's acceleration has steps; the moving mean of s(t) over `ramp` seconds has bounded jerk.
 
 This mean, and any shaper behind it, mixes moments of the motion and so passes a place at speeds of its neighbourhood.
 Joint limits in a cell therefore hold for all cells passed within a time window.
@@ -23,7 +23,7 @@ MIN_DIVISOR = 1e-9  # smallest divisor
 ROUNDS = 3  # rounds of applying windowed limits to a motion, an odd number
 ROUNDING = 1e-9  # relative excess of a limit that counts as rounding [-]
 AT_REST: Floats = np.zeros(1)  # known ṡ² of a motion from rest
-SHORTLY = 1e-9  # time offset from a change of acceleration at which it is evaluated [s]
+SHORTLY = 1e-9  # time offset from a change of acceleration, to evaluate the acceleration beside the step [s]
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ def forward_backward_pass(
 def window_max(
     times: Floats, window: float, values: Floats, lowest: bool
 ) -> Floats:  # pragma: no cover  compiled
-    """Return for each cell the largest (or lowest) value of all cells passed within ± a time window [s].
+    """Return for each cell the largest (or lowest) value of all cells that the motion passes within ± `window` [s].
 
     `times` are those at the edges, shape (c + 1,) [s]; `values` has a row per cell, shape (c, r).
     """
@@ -101,9 +101,9 @@ def window_max(
 
 @compiled
 def flatten_peaks(edges: Floats, b: Floats, ramp: float, known: int) -> Floats:  # pragma: no cover  compiled
-    """Insert constant speed for a ramp [s] between acceleration and braking, which halves their jerk.
+    """Insert constant speed for the time `ramp` [s] between acceleration and braking, which halves the jerk there.
 
-    The motion is unchanged up to edge `known`, and first constant if it brakes there; `b` is ṡ² at the edges, (c + 1,).
+    Nothing changes up to edge `known`; if the motion brakes there, it first keeps its speed. `b` is ṡ² at the edges.
     """
     out, last = b.copy(), len(b) - 1
     number = known + 1
@@ -115,7 +115,7 @@ def flatten_peaks(edges: Floats, b: Floats, ramp: float, known: int) -> Floats: 
     for top in range(known + 1, last):
         if out[top] < out[top - 1] or out[top] <= out[top + 1]:
             continue
-        low, high = top - 1, top + 1  # the last of the highest edges, which need not be one
+        low, high = top - 1, top + 1  # `top` is the last of the highest edges, of which there may be several
         most = max(out[low], out[high])
         while most > 0.0 and edges[high] - edges[low] < np.sqrt(most) * ramp:
             if low > known and (out[low] >= out[high] or high == last):
@@ -124,7 +124,7 @@ def flatten_peaks(edges: Floats, b: Floats, ramp: float, known: int) -> Floats: 
                 high += 1
             else:
                 break
-            if max(out[low], out[high]) <= 0.0:  # no longer than a ramp
+            if max(out[low], out[high]) <= 0.0:  # the whole motion is no longer than a ramp
                 break
             most = max(out[low], out[high])
         for number in range(low + 1, high):
@@ -133,11 +133,11 @@ def flatten_peaks(edges: Floats, b: Floats, ramp: float, known: int) -> Floats: 
 
 
 class RetimedLaw:
-    """Time law of a curve's parameter: moving mean over `ramp` seconds of piecewise constant accelerations.
+    """Time law of a curve's parameter: moving mean, over `ramp` seconds, of a motion with stepped acceleration.
 
-    Acceleration changes only at the edges (c + 1,), where ṡ² is `b`: 0 at the last and possibly the first
-    one. `rate` is the time rate, above 0. `start` is the time at the first edge, before the mean and at rate
-    1 [s]; if `b` is not 0 there, the motion is known only a ramp later.
+    Before the mean, acceleration changes only at the edges (c + 1,). There ṡ² is `b`, which is 0 at the last edge
+    and may be 0 at the first. `rate` is the time rate, above 0. `start` is the time at the first edge, before the
+    mean and at rate 1 [s]; if `b` is not 0 there, the mean is known only `ramp` seconds later.
     """
 
     def __init__(self, edges: Floats, b: Floats, ramp: float, rate: float = 1.0, start: float = 0.0) -> None:
@@ -160,9 +160,9 @@ class RetimedLaw:
         self._rows = list(zip(self._begun.tolist(), *self._pieces.tolist(), strict=True))
         self._starts = self._times.tolist()
         self.duration = float(times[-1] + ramp) / rate  # duration from rest to rest [s]
-        self.begins = 0.0 if b[0] == 0.0 else (start + ramp) / rate  # time from which it is known [s]
+        self.begins = 0.0 if b[0] == 0.0 else (start + ramp) / rate  # time from which the law is known [s]
         braking = int(np.flatnonzero(accelerations < 0.0)[0])
-        self.brakes_at = float(times[braking]) / rate  # time at which it starts braking [s]
+        self.brakes_at = float(times[braking]) / rate  # time at which the motion starts braking [s]
         changes = np.concatenate((times + SHORTLY, times + ramp - SHORTLY))
         changes = changes if b[0] == 0.0 else changes[changes >= start + ramp]
         jerk = (
@@ -173,7 +173,7 @@ class RetimedLaw:
 
     @property
     def moments(self) -> Floats:
-        """Times of possibly largest velocity or acceleration: each cell's start, and up to a ramp later [s]."""
+        """Times at which velocity or acceleration may be largest: at each edge, half a ramp later, a ramp later [s]."""
         times = self._times[1:]
         return np.concatenate((times, times + 0.5 * self.ramp, times + self.ramp)) / self.rate
 
@@ -220,8 +220,8 @@ def arrivals(edges: Floats, b: Floats) -> Floats:
 def quickest_law(way: RetimingLimits, jerk: float, window: float, *, goes_on: bool = False) -> RetimedLaw:
     """Return the quickest law within the limits along a curve.
 
-    The jerk limit is that of s [1/s^3]; within the window [s], a shaper mixes moments of the motion. A law
-    that `goes_on` can be extended with its ramp.
+    `jerk` limits s [1/s^3]. `window` is the time over which a shaper mixes moments of the motion [s]. If
+    `goes_on`, the law can be extended by `longer_law`, which keeps its ramp.
     """
     lengths = np.diff(way.edges)
     b = _passed(way.edges, way.joints, way.tool, AT_REST)
@@ -229,7 +229,7 @@ def quickest_law(way: RetimingLimits, jerk: float, window: float, *, goes_on: bo
     ramp = float(max(accelerations.max() / jerk, (way.slope * accelerations).max() / way.jerk))
     b = _lastingly(way, b, ramp, window, AT_REST)
     law = RetimedLaw(way.edges, flatten_peaks(way.edges, b, ramp, 0) if goes_on else b, ramp)
-    if law.limits.jerk > jerk * (1.0 + 1e-6):  # it goes from acceleration to braking within a ramp
+    if law.limits.jerk > jerk * (1.0 + 1e-6):  # the law goes from acceleration to braking within a ramp
         ramp *= law.limits.jerk / jerk
         law = RetimedLaw(way.edges, _lastingly(way, b, ramp, window, AT_REST), ramp)
     return law
@@ -238,10 +238,10 @@ def quickest_law(way: RetimingLimits, jerk: float, window: float, *, goes_on: bo
 def longer_law(
     way: RetimingLimits, jerk: float, window: float, before: RetimedLaw, first: int, known: int
 ) -> RetimedLaw | None:
-    """Return the quickest law equal to another up to an edge and continuing behind that one's end.
+    """Return the quickest law that equals the law `before` up to an edge, and continues behind its end.
 
-    The way begins with edge `first` of `before`, which also gives the ramp; both laws are equal up to the
-    way's edge `known`. Jerk and window as in `quickest_law`. None if the limits cannot be kept from there.
+    The way begins at edge `first` of `before`. Both laws have the same ramp, and are equal up to the way's edge
+    `known`; None if the limits cannot be kept from there. For `jerk` and `window` see `quickest_law`.
     """
     fixed, ramp, start = before.b[first : first + known + 1], before.ramp, float(before.times[first])
     # The ramp is fixed, so limit the acceleration to keep the jerk.
@@ -254,7 +254,7 @@ def longer_law(
 
 
 def _lastingly(way: RetimingLimits, b: Floats, ramp: float, window: float, known: Floats) -> Floats:
-    """Return the largest ṡ² at the edges within windowed limits; `b` is that without window.
+    """Return the largest ṡ² at the edges that keeps the limits within the window; `b` is ṡ² without window.
 
     The limits of all cells within the window apply, and a faster motion passes more cells. Each round uses the times of
     the motion before it: the first motion becomes slower than necessary, the second too fast, and the third one lies in
@@ -269,7 +269,7 @@ def _lastingly(way: RetimingLimits, b: Floats, ramp: float, window: float, known
 
 
 def _lasting(cells: Cells, times: Floats, window: float) -> Cells:
-    """Return limits that hold for a time window around a motion with these edge times."""
+    """Return each cell's limits combined with those of all cells passed within a time window; `times` at the edges."""
     return Cells(
         window_max(times, window, cells.fastest[:, None], True)[:, 0],
         window_max(times, window, cells.p, False),
@@ -278,7 +278,7 @@ def _lasting(cells: Cells, times: Floats, window: float) -> Cells:
 
 
 def _goes_on(way: RetimingLimits, b: Floats, known: int) -> bool:
-    """Return whether a motion fixed up to an edge keeps the limits in the cell behind it."""
+    """Return whether a motion that is fixed up to edge `known` keeps the limits in the cell behind this edge."""
     cell = slice(known, known + 1)
     acceleration = 0.5 * (b[known + 1] - b[known]) / (way.edges[known + 1] - way.edges[known])
     return all(

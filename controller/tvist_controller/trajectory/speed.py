@@ -21,7 +21,7 @@ BENT_SHARE = 0.5
 """Fraction of joint acceleration available to the curvature of the joints' path at constant speed [-]."""
 MORE = 1e-6  # relative excess of a limit that counts as rounding [-]
 LOOK = 5.0  # ticks ahead over which the curvature is measured
-FARTHEST_LOOK = 0.05  # largest joint angle over which it is measured [rad]
+FARTHEST_LOOK = 0.05  # largest joint angle over which the curvature is measured [rad]
 SLOWEST = 0.01  # fraction of the commanded speed below which the tool is stuck [-]
 CORRECTIONS = 4  # largest number of Newton steps
 OFF = 1e-7  # permitted error of the tool's pose [m or rad]
@@ -30,7 +30,7 @@ FLAT = 1e-12  # factor of a rate treated as zero
 
 @compiled_for_ticks
 def fitting_rates(x: Floats, y: Floats, low: Floats, high: Floats) -> tuple[float, float]:
-    """Return the range of r with low ≤ x + r y ≤ high everywhere; the first is larger if there is none."""
+    """Return least and largest r with low ≤ x + r y ≤ high in all entries; if there is none, least > largest."""
     lowest, highest = -math.inf, math.inf
     for i in range(len(x)):
         if abs(y[i]) < FLAT:
@@ -46,9 +46,9 @@ def fitting_rates(x: Floats, y: Floats, low: Floats, high: Floats) -> tuple[floa
 def rate_by_bend(
     chain: Floats, q: Floats, slope: Floats, u: Floats, ahead: float, acceleration: float
 ) -> float:
-    """Return the rate that path curvature permits; `slope` becomes the larger of now and ahead.
+    """Return the rate that path curvature permits; `slope` becomes the larger of its values now and ahead.
 
-    Near a singular posture the joints' path bends: its second derivative times squared speed is acceleration.
+    Near a singular posture the joints' path bends, which takes acceleration: second derivative times squared speed.
     """
     n = len(q)
     jacobian, inverse, later_q = np.empty((6, n)), np.empty((n, 6)), np.empty(n)
@@ -73,15 +73,15 @@ def speed_step(  # noqa: C901, PLR0912  a kernel: its branches are loops
     joints: Floats,  # present positions [rad] and the step to them [rad], shape (2, n)
     velocities: Floats,  # at the beginning and the end, in the trajectory's own time, shape (2, 6) or (2, n)
     ranges: Floats,  # least and largest change of the joints' step, and largest step, shape (3, n) [rad]
-    change: Floats,  # largest one of the velocity, shape (6,) or (n,)
+    change: Floats,  # largest change of the velocity, shape (6,) or (n,)
     given: Floats,  # present and wanted rate [-], the joints' limits, `Speed._lag`, tick [s]
     place: Floats,  # present rotation and position of the tool, shape (4, 3)
-    goal: Floats,  # result: those a tick later
+    goal: Floats,  # result: rotation and position of the tool a tick later
     q: Floats,  # result: positions of the joints a tick later, shape (n,) [rad]
 ) -> tuple[int, float]:
-    """Follow the mean of two velocities for a tick, at the rate that joint limits and curvature permit.
+    """Move for a tick at the mean of two velocities, and at the time rate that joint limits and curvature permit.
 
-    Returns FOUND and the final rate; or IMPOSSIBLE due to limits; or SINGULAR if curvature permits hardly any speed.
+    Returns FOUND and the final rate; IMPOSSIBLE if limits prevent the step; SINGULAR if curvature nearly prevents it.
     """
     rate, speed, slowest, acceleration, lag, h = given[0], given[1], given[2], given[3], given[4], given[5]
     n, straight = len(q), chain.shape[0] > 0
@@ -165,7 +165,7 @@ class Speed(Guided):
         limits: MotionLimits,  # of every joint; the jerk is that of stops
         torque: TorqueMargin,
         *,
-        rate: float = 1.0,  # of its time, 0 to 1 [-]; more if the joints are too fast for it at the start
+        rate: float = 1.0,  # time rate, 0 to 1 [-]; more if the joints are too fast for this rate at the start
         arm: Arm | None = None,  # the arm whose tool has the velocity; None for velocities of the joints
     ) -> None:
         self._q, self._qd, self._qdd = (np.array(values, dtype=float) for values in state)
@@ -202,18 +202,18 @@ class Speed(Guided):
         self._goal = np.zeros_like(self._goal)
 
     def adopt(self, limits: MotionLimits) -> None:
-        """See `Guided.adopt`; the jerk is that of reversing the acceleration within a tick."""
+        """See `Guided.adopt`; the jerk limit permits reversing the acceleration within a tick."""
         self._arm_limits, self.limits = limits, abrupt(limits)
 
     def pace(self, speed: float, slowest: float | None) -> None:
-        """Set the speed; the present one stays until the next tick."""
+        """Set the speed; in motion, the rate changes from the next tick on."""
         self._speed, self._slowest = speed, self._arm_limits.velocity if slowest is None else slowest
         if not self._u.any():
             self.rate = self._wanted_rate
 
     @property
     def _wanted_rate(self) -> float:
-        """The commanded rate, or less to keep joint limits, which for a tool `speed_step` handles."""
+        """The commanded rate, lowered to keep joint velocities; for tool velocities, `speed_step` lowers the rate."""
         if self.arm is not None:
             return self._speed
         fastest = max(float(np.abs(self._goal).max()), float(np.abs(self._u).max()))
@@ -221,7 +221,7 @@ class Speed(Guided):
 
     @property
     def _accelerations(self) -> Floats:
-        """Accelerations in use: of the joints, or both of the tool."""
+        """Accelerations in use: that of the joints, or linear and angular acceleration of the tool."""
         most = np.array(self._most)
         return most if self.arm is not None else np.minimum(most, self._arm_limits.acceleration)
 
@@ -241,7 +241,7 @@ class Speed(Guided):
 
     @property
     def finished(self) -> bool:
-        """Whether it has come to rest as commanded."""
+        """Whether the commanded velocity is zero and has been reached."""
         return not (self._goal.any() or self._u.any())
 
     def next(self) -> Floats:
@@ -285,7 +285,7 @@ class Speed(Guided):
 
     @property
     def _lag(self) -> float:
-        """Factor from acceleration to step change [s^2]: half a tick squared for joints, a whole one for tools."""
+        """Factor from acceleration to change of a tick's step [s^2]: h²/2 for joint motions, h² for tool motions."""
         return (0.5 if self.arm is None else 1.0) * PERIOD**2
 
     def _ranges(self) -> Floats:
@@ -295,8 +295,8 @@ class Speed(Guided):
         """
         h, limits, speed = PERIOD, self._arm_limits, np.abs(self._qd)
         most = (1.0 + ROUNDING if self.arm is None else USED) * limits.acceleration
-        # A stop ends the present acceleration with the limit's jerk, and the joint gets faster until it has. Two ticks
-        # are reserved, since the acceleration of the newest reference is known as the mean of two ticks.
+        # A stop ends the present acceleration with limited jerk, and meanwhile the joint still gets faster. Two ticks
+        # are reserved, since the acceleration of the newest reference is known only as the mean of two ticks.
         left, two = np.maximum(limits.velocity - speed, 0.0), 2.0 * h
         rise = limits.jerk * (np.sqrt(two * two + 2.0 * left / limits.jerk) - two)
         rise = np.minimum(np.minimum(rise, limits.acceleration), most)

@@ -82,8 +82,8 @@ def evaluate(
 class SplineCurve(Path):
     """A curve through knots with known positions and first two derivatives.
 
-    Its parameter s rises from any start, in any unit. Interpolation may pass either end by a thousandth of a
-    tick's step, where the outermost polynomials continue. With ṡ, s̈ and s⃛ the joints have
+    The parameter s rises from any start, in any unit. Samples may lie beyond either end by a thousandth of a
+    tick's step; the outermost polynomials continue there. With ṡ, s̈ and s⃛ the joints have
 
         q̇ = q' ṡ,    q̈ = q' s̈ + q'' ṡ²,    q⃛ = q' s⃛ + 3 q'' ṡ s̈ + q''' ṡ³,
 
@@ -120,7 +120,7 @@ class SplineCurve(Path):
 
     def become(self, other: "SplineCurve") -> None:
         """Continue as another curve that is equal between the present point and this one's end."""
-        posture_of = self.posture_of  # captured by what is shaped on this curve
+        posture_of = self.posture_of  # filter and shaped reference hold this function, bound to this object
         self.__dict__.update(other.__dict__)
         self.posture_of = posture_of
         self._one = np.empty_like(self._one)
@@ -135,7 +135,7 @@ class SplineCurve(Path):
         return q, slope, second
 
     def bends_within(self, start: float, end: float) -> Bends:
-        """Return bounds of derivatives between two parameters."""
+        """Return bounds of the derivatives on the part between two parameters."""
         last = len(self._slope)
         low = min(max(int(np.searchsorted(self._knots, start, side="right")) - 1, 0), last - 1)
         high = min(max(int(np.searchsorted(self._knots, end, side="left")), low + 1), last)
@@ -196,7 +196,7 @@ class SplineCurve(Path):
 
 
 def kept_by(bends: Bends, limits: MotionLimits, velocity: float) -> MotionLimits | None:
-    """Return the limits left by a part of a curve at a velocity; acceleration leaves a fraction of jerk."""
+    """Return a parameter's limits that keep joint limits on a part of a curve; `acceleration` leaves room for jerk."""
     slope, second, third = float(bends.slope.max()), bends.second, bends.third
     acceleration = (limits.acceleration - second * velocity**2) / slope
     bent = CURVED_SHARE * limits.jerk - third * velocity**3

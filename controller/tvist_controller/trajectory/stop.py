@@ -11,7 +11,7 @@ from tvist_plant.plant import PERIOD
 
 
 class Slowing(Trajectory):
-    """Shortest way to rest of several entries, each within limits of acceleration and jerk."""
+    """Shortest way to rest of joints or entries of a path's parameter, within limits of acceleration and jerk."""
 
     def __init__(
         self,
@@ -53,7 +53,7 @@ class Slowing(Trajectory):
 
     @property
     def finished(self) -> bool:
-        """Whether it has come to rest."""
+        """Whether the stop has come to rest."""
         return self._ticks * PERIOD >= self.duration
 
 
@@ -87,9 +87,9 @@ class PathStop(Slowing):
     has the lowest possible acceleration until that must return to zero. A stop that brakes at least as hard
     as the motion ever would is therefore never ahead of the motion.
 
-    It brakes with full jerk from the first step: the second difference b of the last positions becomes b -
-    jerk·h, and the stop continues from the state that central differences give for this step. If the limits
-    allow it to stand at once, it does.
+    The stop brakes with full jerk from the first step: the second difference b of the last positions becomes
+    b - jerk·h, and the stop continues from the state that central differences give for this step. If the limits
+    allow standing still at once, the stop does so.
     """
 
     path: Path
@@ -98,11 +98,11 @@ class PathStop(Slowing):
         self,
         path: Path,
         x: Floats,  # newest sample, shape (m,) [rad]
-        step: Floats,  # from the sample before, along the path's direction, shape (m,) [rad]
-        xdd: Floats,  # second difference of the last three, likewise, shape (m,) [rad/s^2]
+        step: Floats,  # step from the previous sample to x, along the path's direction, shape (m,) [rad]
+        xdd: Floats,  # acceleration from the last three samples, along the path's direction, shape (m,) [rad/s^2]
         *,
         acceleration: float,  # limit for the joints [rad/s^2]
-        braking: float,  # corresponding one for the parameter [rad/s^2]
+        braking: float,  # corresponding limit for the parameter [rad/s^2]
         jerk: float,  # limit for the parameter [rad/s^3]
     ) -> None:
         before, period = path.forwards(xdd), PERIOD
@@ -146,8 +146,8 @@ class PathStop(Slowing):
 class SlowedStop(Trajectory):
     """A motion whose time slows down until it stands.
 
-    If tight bends lie ahead, for which the motion itself slows down, no limits based on curvature alone suit a stop.
-    This one passes the bends as the motion would, only later: on the path, never ahead of the motion, and no faster.
+    If tight bends lie ahead, the motion itself slows down for them, and no stop within constant limits suits them. A
+    `SlowedStop` passes the bends as the motion would, but later: on the path, never ahead of the motion, and no faster.
     """
 
     path: Path
@@ -157,8 +157,8 @@ class SlowedStop(Trajectory):
         path: Path,
         ahead: Floats,  # parameter at the last two ticks and the coming ones, shape (k, m), k >= 4
         *,
-        acceleration: float,  # that the slowing of time may cause at any joint [rad/s^2]
-        jerk: float,  # that it may cause [rad/s^3]
+        acceleration: float,  # largest that the slowing of time may cause at any joint [rad/s^2]
+        jerk: float,  # largest that the slowing of time may cause at any joint [rad/s^3]
         fastest: float,  # largest velocity of any joint now [rad/s]
     ) -> None:
         self.path, self.acceleration, self.jerk = path, acceleration, jerk
@@ -198,7 +198,7 @@ class SlowedStop(Trajectory):
 
     @property
     def finished(self) -> bool:
-        """Whether it has come to rest."""
+        """Whether the stop has come to rest."""
         return self._ticks >= len(self._samples) - 1
 
     @property
@@ -220,7 +220,7 @@ class SlowedStop(Trajectory):
 
 
 def _between(ahead: Floats, ticks: Floats) -> Floats:
-    """Interpolate a motion between its ticks, counted from the second sample, by cubic splines."""
+    """Interpolate a motion by cubic splines at times in ticks, which count from the second sample."""
     last = len(ahead) - 1
     number = np.minimum(ticks.astype(int), last - 1) + 1
     t = (ticks - (number - 1))[:, None]

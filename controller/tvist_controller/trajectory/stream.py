@@ -20,15 +20,15 @@ BRIDGED = 2  # largest number of consecutive missing set-points that are extrapo
 class SetpointStream(LimitedFollower):
     """A reference generated from a client's set-points.
 
-    At the controller's rate, set-points pass unchanged. Slower ones are control points of a cubic B-spline,
-    which keeps the limits that they keep. The spline needs two periods and a third is for jitter, so the
-    reference is late by three periods minus a tick, or more if set-points come later or by another clock
-    (`PlayOut`). A set-point missing when due is replaced by a point on the parabola through its neighbours.
-    If none arrive, the reference comes to rest within limits until the stream continues. After a gap, or if
-    the sender runs ahead, play-out continues with the newest. The result passes the `Limiter`.
+    Set-points at the controller's rate pass unchanged. Set-points at a lower rate are control points of a cubic
+    B-spline, which keeps their limits. The spline needs two periods and jitter a third, so the reference is late
+    by three periods minus a tick, or more if set-points come later or by another clock (`PlayOut`). If a
+    set-point is missing when due, a point on the parabola through its neighbours replaces it. If no set-points
+    arrive, the reference comes to rest within limits until the stream continues. After a gap, or if the sender
+    runs ahead, play-out continues with the newest set-point. The result passes the `Limiter`.
     """
 
-    finished = False  # it is ended from outside
+    finished = False  # a stream is ended from outside
     MAX_WAITING = 1000  # largest number of set-points waiting for play-out
 
     def __init__(
@@ -97,7 +97,7 @@ class SetpointStream(LimitedFollower):
 
     @property
     def delay(self) -> float:
-        """Time from arrival of the earliest set-points until the curve reaches them [s]."""
+        """Time from arrival of set-points that come early until the curve reaches them [s]."""
         return 0.0 if self._play_out is None else self._play_out.delay * PERIOD
 
     def _receive(self) -> None:
@@ -116,12 +116,12 @@ class SetpointStream(LimitedFollower):
         self._heard.clear()
         if min(self._waiting) <= self._head:
             for sequence in sorted(number for number in self._waiting if number <= self._head):
-                # It was replaced meanwhile, but later replacements should take it into account.
+                # This set-point came too late and was replaced, but later replacements should take it into account.
                 self._keep(sequence, self._waiting.pop(sequence))
                 self.late += 1
 
     def _restart(self, newest: int) -> PlayOut:
-        """Continue with the newest set-point; other waiting ones become the curve's last points."""
+        """Continue with the newest set-point, after putting all others that wait on the curve."""
         self._head = self._real[-1][0]
         for sequence in sorted(self._waiting):
             if sequence != newest:
@@ -143,7 +143,7 @@ class SetpointStream(LimitedFollower):
         return q, qd
 
     def _complete(self, needed: int) -> bool:
-        """Extend the curve to a number if there are points for it; return whether there are."""
+        """Extend the curve to the sequence number `needed`; return False if there are not enough points."""
         while self._head < needed:
             missing = self._head + 1
             if self._waiting:
@@ -192,7 +192,7 @@ def linear(
     u: float,  # place between the last two, 0 < u ≤ 1; at 1 the value is exactly the last point [-]
     rate: float,  # of u [1/s]
 ) -> tuple[Floats, Floats, float]:
-    """Interpolate linearly, with the slope of a parabola; return the value, its derivative, and the largest slope."""
+    """Interpolate linearly; return value, derivative (of a parabola, which has no steps), and largest derivative."""
     found = np.empty((2, len(points[0])))
     fastest = on_parabola(points[1], points[2], points[3], u, rate, found)
     return found[0], found[1], fastest
@@ -201,9 +201,9 @@ def linear(
 def cubic(points: Sequence[Floats], u: float, rate: float) -> tuple[Floats, Floats, float]:
     """Evaluate the uniform cubic B-spline between the middle two of four points; see `linear`.
 
-    Its second derivative varies linearly between the points' second differences and its third is their third
-    difference, so it keeps the points' limits of velocity, acceleration and jerk. It passes the points at a
-    distance of q''/6 on the inside of the bend (de Boor 1978, ch. IX to XI).
+    The spline's second derivative varies linearly between the points' second differences, and its third derivative
+    is their third difference, so the spline keeps the points' limits of velocity, acceleration and jerk. It passes
+    the points at a distance of q''/6 on the inside of the bend (de Boor 1978, ch. IX to XI).
     """
     v = 1.0 - u
     found = np.empty((2, len(points[0])))

@@ -22,7 +22,7 @@ Asked = tuple[RobotDescription, Payload, SceneFile, float, Hand | None]  # argum
 
 
 def build_apart(asked: Asked) -> World:
-    """Put an arm into a scene as `build` does; raise SceneError also if MuJoCo fails."""
+    """Put an arm into a scene as `build` does, in another process; raise SceneError also if MuJoCo fails."""
     done = subprocess.run(  # noqa: S603
         [sys.executable, "-P", "-m", __name__],
         input=pickle.dumps((LONGEST, asked)),

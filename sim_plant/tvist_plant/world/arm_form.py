@@ -17,7 +17,7 @@ LOAD = "load"  # name of the body beyond the flange: the payload, and the finger
 
 
 def hinges(description: RobotDescription, model: "mujoco.MjModel") -> tuple[Integers, Integers, Integers]:
-    """Return the coordinates of joints, motors and virtual joints, y and z of each bending link."""
+    """Return the numbers of the coordinates of joints, motors and virtual joints (y and z of each bending link)."""
     numbers = range(description.joints)
     names = (
         [f"joint {number}" for number in numbers],
@@ -36,7 +36,7 @@ def link_name(description: RobotDescription, number: int) -> str:
 
 
 def arm_spec(description: RobotDescription, payload: Payload, timestep: float) -> "mujoco.MjSpec":
-    """Return the arm without contacts: hinges, a welded body per link frame, rotors beside the chain."""
+    """Return the arm without contacts: hinges, a welded body per link frame, and rotors outside the chain of links."""
     kinematics, links, drives = description.kinematics, description.links, description.drives
     flexibility = description.link_flexibility
     stiffness_of = dict(zip(flexibility.links, flexibility.stiffness, strict=True))
@@ -99,7 +99,7 @@ def arm_spec(description: RobotDescription, payload: Payload, timestep: float) -
 
 
 def principal(inertia: Tensor) -> tuple[list[float], list[float]]:
-    """Return principal moments, above zero for MuJoCo, and their axes as a quaternion."""
+    """Return principal moments, raised above zero as MuJoCo requires, and their axes as a quaternion."""
     moments, axes = np.linalg.eigh(matrix(inertia))
     if np.linalg.det(axes) < 0.0:
         axes = -axes
@@ -107,7 +107,7 @@ def principal(inertia: Tensor) -> tuple[list[float], list[float]]:
 
 
 def carry(model: "mujoco.MjModel", payload: Payload) -> None:
-    """Set the payload of the body beyond the flange."""
+    """Set mass properties of the body beyond the flange to those of a payload."""
     load = model.body(LOAD).id
     model.body_mass[load], model.body_ipos[load] = payload.mass, payload.com
     model.body_inertia[load], model.body_iquat[load] = principal(payload.inertia)

@@ -66,7 +66,7 @@ def add_pairs(spec: "mujoco.MjSpec", model: "mujoco.MjModel", arm: Names) -> Con
                 f"more than {MOST_PAIRS} pairs of shapes may touch, too many for real time; "
                 'give what is only seen contype="0" conaffinity="0"'
             )
-    for one in spec.geoms:  # only the pairs touch
+    for one in spec.geoms:  # only shapes of the added pairs touch
         one.contype = one.conaffinity = 0
     return given
 
@@ -79,7 +79,7 @@ def set_contacts(model: "mujoco.MjModel", given: Contacts) -> None:
         if model.pair_solimp[number][0] != IMPEDANCE:
             continue  # keep the scene's own pairs
         if (inverse := _inverse_mass(model, number)) == 0.0:
-            continue  # both are immovable
+            continue  # both shapes are immovable
         k = STIFFNESS if stiffness is None else stiffness
         c = 2.0 * DAMPING_RATIO * np.sqrt(k / inverse) if damping is None else damping
         kinds = {int(model.geom_type[geom]) for geom in (model.pair_geom1[number], model.pair_geom2[number])}
@@ -89,9 +89,9 @@ def set_contacts(model: "mujoco.MjModel", given: Contacts) -> None:
 
 
 def _count_turning(model: "mujoco.MjModel") -> None:
-    """Set the inverse mass of bodies that turn about their centre of mass, from their inertia and reach.
+    """Set the inverse mass of bodies that can only turn about their centre of mass, from their inertia and reach.
 
-    MuJoCo's Â holds for the centre of mass, which then does not move, and would be zero or far too small.
+    MuJoCo's Â refers to the centre of mass, which does not move in such bodies: Â would be zero or far too small.
     """
     for body in range(1, model.nbody):
         light, turning = model.body_invweight0[body]
@@ -103,7 +103,7 @@ def _count_turning(model: "mujoco.MjModel") -> None:
 
 
 def check_masses(model: "mujoco.MjModel", timestep: float) -> None:
-    """Check that no body is too light for the springs it may touch."""
+    """Check that no body is too light for the contact springs of shapes that it may touch."""
     for number in range(model.npair):
         inverse = _inverse_mass(model, number)
         if inverse == 0.0:
@@ -131,7 +131,7 @@ def _inverse_mass(model: "mujoco.MjModel", pair: int) -> float:
 def _touching(
     shapes: Sequence["mujoco.MjsGeom"], model: "mujoco.MjModel", arm: Names, apart: set[frozenset[str]]
 ) -> Iterator[tuple["mujoco.MjsGeom", "mujoco.MjsGeom"]]:
-    """Yield pairs by MuJoCo's rules: at least one moves, and their bodies are not equal or adjacent."""
+    """Yield pairs of shapes by MuJoCo's rules: at least one moves, and their bodies are neither equal nor adjacent."""
     fixed_to = model.body_weldid
 
     def before(body: int) -> int:

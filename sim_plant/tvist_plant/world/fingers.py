@@ -42,7 +42,7 @@ def add_fingers(spec: "mujoco.MjSpec", load: "mujoco.MjsBody", hand: Hand) -> No
 
 
 class Fingers:
-    """Position controller of the fingers of a compiled arm."""
+    """Position controller of the fingers in a compiled MuJoCo model."""
 
     def __init__(self, model: "mujoco.MjModel", hand: Hand) -> None:
         self._dofs = [int(model.joint(name).dofadr[0]) for name in SIDES]

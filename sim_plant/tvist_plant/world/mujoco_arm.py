@@ -143,7 +143,7 @@ class MujocoArm(SimulatedArm):
         return measured
 
     def move(self, command: DriveCommand) -> None:
-        """Simulate one period in which the drives' commands go linearly to this one."""
+        """Simulate one period, in which the drives' commands change linearly from the previous to the given ones."""
         if self._fingers is not None:
             self._fingers.drive(self._data)
         start, end = self._command, np.array([command.q, command.qd, command.torque])
@@ -176,9 +176,9 @@ class MujocoArm(SimulatedArm):
         )
 
     def _wrench(self) -> Floats:
-        """Return the wrench on the flange from everything beyond it, in its frame, shape (6,) [N, N m]."""
+        """Return the wrench that everything beyond the flange exerts on it, in its frame, shape (6,) [N, N m]."""
         data, load = self._data, self._load
-        whole = data.cfrc_int[load]  # of the flange, about the centre of mass of the arm
+        whole = data.cfrc_int[load]  # wrench of the flange on the load, about the centre of mass of the arm
         x, y, z = (data.subtree_com[self._model.body_rootid[load]] - self._place).tolist()
         fx, fy, fz = whole[3:].tolist()
         moment = whole[:3] + np.array([y * fz - z * fy, z * fx - x * fz, x * fy - y * fx])
@@ -200,10 +200,10 @@ class MujocoArm(SimulatedArm):
         )
 
     def load(self, payload: Payload) -> None:
-        """Carry another payload from now on; its collision shape stays that of the first one."""
+        """Carry another payload from now on; the collision shape stays that of the first payload."""
         self.payload, self._evaluated = payload, False
         carry(self._model, payload)
-        set_contacts(self._model, self._world.contacts)  # their stiffness is relative to the masses
+        set_contacts(self._model, self._world.contacts)  # stiffness of contacts is relative to the masses
 
     def push(self, torque: Floats) -> None:
         """Apply external torques to the joints."""
@@ -233,7 +233,7 @@ class MujocoArm(SimulatedArm):
         """Return what the arm would overlap after a reset, None if nothing."""
         model = copy(self._model)
         if payload is not None:
-            carry(model, payload)  # it bends the arm
+            carry(model, payload)  # the payload's weight bends the arm
         data = mujoco.MjData(model)
         settle(self._description, model, data, q)
         return self._met(data)

@@ -63,7 +63,7 @@ def find_scene(name: str) -> SceneFile:
 def _named(root: Element, folder: Path) -> list[Path]:
     """Return the existing files that a scene and its included files name; MuJoCo reports missing ones."""
     folders, names, elements, included = {folder}, set[str](), list(root.iter()), 0
-    for one in elements:  # grows with each included file
+    for one in elements:  # the list grows with each included file
         for key, value in one.items():
             if one.tag == "compiler" and key.endswith("dir"):
                 folders.add(folder / value)

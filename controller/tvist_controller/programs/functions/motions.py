@@ -91,7 +91,7 @@ class ForceModeMoves:
         return self._arm.guide(start, wait())
 
     def _way(self, segment: Segment) -> tuple[Floats, float]:
-        """Return the remaining way of a move and its length, in joints or of the tool."""
+        """Return the remaining way of a move, in joint positions or of the tool, and its length."""
         here = self._access.guidance.reference
         if isinstance(segment, JointSegment):
             turn = np.array(segment.q) - here
@@ -280,7 +280,7 @@ class MotionFunctions(Family):
         return self._access.guidance.reference
 
     def _wait(self, t: float | None) -> Iterator[None]:
-        """Wait for a time, or without one until the velocity is reached."""
+        """Wait for t [s]; if t is None, wait until the velocity is reached."""
         if t:
             yield from self._arm.in_motion(t)
             return
@@ -289,7 +289,7 @@ class MotionFunctions(Family):
             yield
 
     def _posture(self, name: str, value: object) -> tuple[float, ...]:
-        """Return joint positions within range, from these or from a pose."""
+        """Return joint positions within range; `value` is joint positions or a pose."""
         if isinstance(value, Pose):
             return self._kinematics.posture(args.pose(name, value), self._near)
         q = args.numbers(name, value, self._access.description.joints)
@@ -316,5 +316,5 @@ class MotionFunctions(Family):
 
 
 def _within(value: float, name: str, most: float = np.inf) -> float:
-    """Clamp velocity or acceleration to what the arm can do and what moves it."""
+    """Clamp a velocity or acceleration: at most what the arm permits, at least what moves the arm."""
     return min(max(value, SLOWEST[name]), most)
