@@ -71,7 +71,7 @@ class ChangeDetector:
                     abs(moved) / error_of_it,
                     DetectedChange(mean, after, error_since, int(new.sum())),
                 )
-                if abs(after - mean) < CLEAR * error_since:  # the newest ones alone are too uncertain
+                if abs(after - mean) < CLEAR * error_since:  # the farthest ones alone are too uncertain
                     found = DetectedChange(mean, mean + moved, error_of_it, number)
         if found is not None:
             self._kept = self._kept[-found.lasting :]
