@@ -56,9 +56,9 @@ def median_interval(values: Floats) -> tuple[float, float | None, float | None]:
 
 
 def in_alternation(runs: Mapping[str, Run], repetitions: int) -> dict[str, list[float]]:
-    """Measure several things in turn, forwards and backwards, so that a drift of the machine's speed cancels out.
+    """Run several measurements in turn, forwards and backwards, so that a drift of the machine's speed cancels out.
 
-    Each runs once beforehand, to exclude one-time costs.
+    Each measurement runs once beforehand, to exclude one-time costs.
     """
     names = list(runs)
     for run in runs.values():

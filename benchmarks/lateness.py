@@ -16,7 +16,7 @@ from tvist_lab.served import RunningServer, served
 from tvist_plant.plant import PERIOD
 
 SEGMENT = 4.0
-"""Longest segment [s]; a robot that is halted for one responds before Zenoh's lease of 10 s expires."""
+"""Longest segment [s]; a robot that is halted for a segment responds before Zenoh's lease of 10 s expires."""
 SETTLE_TICKS = 200  # ticks after a halt that do not count, since the robot makes up for some of the time
 STUDIES = {"alone": 0, "ten_clients": 10}
 
@@ -48,7 +48,7 @@ async def _robot(server: RunningServer, segment: float) -> float:
 
 
 async def _thread(server: RunningServer, bare: Process, segment: float) -> float:
-    """Return the same for the bare thread, while the robot is halted."""
+    """Return the ticks that the bare thread misses in a segment [% of those due], while the robot is halted."""
     # Two halts in a row would outlast the lease, so the robot reads its messages between them.
     await server.robot.advance(SETTLE_TICKS)
     os.kill(server.pid, signal.SIGSTOP)

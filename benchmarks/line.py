@@ -1,4 +1,4 @@
-"""Processor time of a tick of plant, filter, Figure 6 and the whole line, compared with MuJoCo's."""
+"""Processor time of a tick of plant, filter, control cycle (Figure 6) and the whole line, compared with MuJoCo's."""
 
 from collections.abc import Mapping
 
@@ -20,7 +20,7 @@ class _Mujoco(MujocoArm):
 
 
 def line(tell: Tell) -> dict[str, Figure]:
-    """Measure the line and its parts."""
+    """Measure a tick of the control line and of its parts."""
     tell("the line and its parts beside MuJoCo")
     parts = {
         "plant": ("2 ms of the flexible arm", moving.plant_tick()),
@@ -37,7 +37,7 @@ def line(tell: Tell) -> dict[str, Figure]:
 
 
 def streams(tell: Tell) -> dict[str, Figure]:
-    """Measure the line while it receives set-points."""
+    """Measure a tick of the control line while it receives set-points."""
     tell("streams of set-points beside MuJoCo")
     said = "the line with zv and set-points at {} Hz"
     parts = {f"stream_{rate}_hz": (said.format(rate), moving.stream_tick(500 // rate)) for rate in (500, 125)}

@@ -44,7 +44,7 @@ def in_process() -> float:
 
 
 async def reader(seconds: float, tell: Tell) -> dict[str, Figure]:
-    """Measure a robot whose client reads each state; in another process, the line, and puts of as many bytes."""
+    """Measure a robot whose client reads each state, and in another process the bare line and bare puts of a state."""
     part, endpoint = max(SHORTEST, seconds / OF_READER), free_endpoint()
     found: dict[str, list[float]] = {name: [] for name in READER}
     lines: list[float] = []
@@ -99,7 +99,7 @@ async def _share(pid: int, seconds: float) -> float:
 
 
 async def robots(seconds: float, tell: Tell) -> dict[str, Any]:
-    """Measure the cost of a robot among others, and how many robots one core computes."""
+    """Measure the cost of each of several robots in a process, and how many robots one core computes."""
     tell("the line of one robot")
     line = in_process()
     one = await _us_per_robot_and_tick(OF_MANY * seconds, tell)

@@ -1,8 +1,8 @@
-"""Draw mutants of the product, and check whether its tests find them, both at the last commit.
+"""Draw mutants of the product's last commit, and check whether the tests of that commit find them.
 
 A mutant changes one operator, constant or branch. Before you run mutants, record with `tools.executed` which
-test executes which line. That records neither kernels nor uses of values computed at import: the tests of
-such a line are those that execute a line which mentions the kernel or the name, or else any line of the file.
+test executes which line. Lines in kernels and lines that run at import are not recorded. Their tests are those
+that execute a line which mentions the kernel or the assigned name, or if none does, any line of the file.
 """
 
 import ast
@@ -46,7 +46,7 @@ app = App(name="python -m tools.mutants", help=__doc__)
 
 
 def walk(node: ast.AST, owner: str, hidden: bool, span: tuple[int, int]) -> Iterator[tuple[ast.AST, Mutant]]:
-    """Yield all executed nodes: the name each belongs to, whether coverage misses it, and its statement's lines."""
+    """Yield all nodes that run, each with its function or variable, whether coverage misses it, and its lines."""
     if isinstance(node, ast.JoinedStr) or (isinstance(node, ast.If) and "TYPE_CH" in ast.unparse(node.test)):
         return  # positions in f-strings are wrong before Python 3.12
     if isinstance(node, ast.stmt):
@@ -131,7 +131,7 @@ def tests_of(mutant: Mutant, folder: Path) -> set[str]:
     lines, span = executed(folder, mutant["file"]), range(mutant["span"][0], mutant["span"][1] + 1)
     found = {one for line in span for one in lines.get(line, ()) if not mutant["hidden"]}
     waiting = [] if found else [mutant["owner"]]
-    for name in waiting:  # it grows in the loop
+    for name in waiting:  # the loop extends this list
         for place in product()[1][name]:
             if not place["hidden"]:
                 found |= executed(folder, place["file"]).get(place["line"], set())
@@ -152,7 +152,7 @@ def ran(where: Path, tests: list[str]) -> tuple[int | None, str]:
 
 def ended(where: Path, limit: float, *words: str) -> tuple[int | None, str]:
     """Run a program of the copy; return its exit code (None if it had to be killed) and its output."""
-    paths = os.pathsep.join(str(where / one) for one in ["", *SOURCES])  # they precede the checkout's
+    paths = os.pathsep.join(str(where / one) for one in ["", *SOURCES])  # before those of the checkout
     around = {**os.environ, "PYTHONPATH": paths, "OPENBLAS_NUM_THREADS": "1"}
     with tempfile.TemporaryFile() as out:
         process = subprocess.Popen(
@@ -168,7 +168,7 @@ def ended(where: Path, limit: float, *words: str) -> tuple[int | None, str]:
 
 
 def judged(mutant: Mutant, where: Path, folder: Path) -> Mutant:
-    """Run a mutant's tests; a test that fails without the mutant, too, does not count."""
+    """Run a mutant's tests; ignore tests that also fail without the mutant."""
     there, tests, file = tests_of(mutant, folder), [], where / mutant["file"]
     whole, before, start = file.read_bytes(), mutant["before"].encode(), time.monotonic()
     at = sum(map(len, whole.splitlines(keepends=True)[: mutant["line"] - 1])) + mutant["column"]

@@ -124,7 +124,7 @@ def _(count, draw):
 @app.cell
 def _(calibration, moves, own, robot):
     def try_on_moves(name, frequency_error):
-        """Make each move unshaped and shaped, with a frequency that is too high by a share."""
+        """Make each move unshaped and shaped; the shaper's frequency is too high by a share."""
         known = (OwnShaper("lesson_2_your_shaper.py", "mine", "", own),)
         method = Named(Recipe(name, calibration, frequency_error, own=known), name)
         return [measure(Job(Case(robot, move), (method,)))[0] for move in moves]
@@ -140,7 +140,7 @@ def _(error, rival, try_on_moves):
 
 @app.function
 def remaining(judged):
-    """Median ratio of shaped to unshaped peak; moves that hardly ring count only if all do."""
+    """Median ratio of shaped to unshaped peak; moves that hardly vibrate are left out, unless all do."""
     loud = [row for row in judged if row["reduction_percent"] is not None] or judged
     return float(np.median([row["shaped_peak_m_s2"] / row["unshaped_peak_m_s2"] for row in loud]))
 

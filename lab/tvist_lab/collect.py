@@ -1,4 +1,4 @@
-"""Move a robot as a client to where it is measured, and collect its messages."""
+"""As a client, move a robot to the place of a measurement, and collect its messages."""
 
 from collections.abc import Awaitable, Iterator
 from contextlib import contextmanager
@@ -26,7 +26,7 @@ class Collected:
     truths: list[Truth] = field(default_factory=list)
 
     def recording(self) -> Recording:
-        """Return the messages as columns, from the first to the last tick for which all have arrived."""
+        """Return the messages as columns; with truths, from the first to the last tick that has a truth."""
         # On a network the truth of a tick may come before or after its state.
         from tvist_lab.recordings.messages import recording_of_messages
 
@@ -64,9 +64,9 @@ async def unless_collision(measuring: Awaitable[Result]) -> Result | None:
 
 
 async def reach(arm: Arm, q: Floats) -> Motion:
-    """Move to a configuration; if the straight line collides, via the upright arm.
+    """Move to a configuration; if the straight line collides, move via the upright arm.
 
-    Raises RefusedError with code `collision` if that way collides, too.
+    Raises RefusedError with code `collision` if the way via the upright arm collides, too.
     """
     if (there := await unless_collision(arm.move_j(q))) is not None:
         return there

@@ -9,7 +9,7 @@ ALLOWED = 0.05  # residual vibration at which a mode counts as settled [-]
 
 
 def residual_over_error(shaper: Shaper, zeta: float, errors: Floats) -> Floats:
-    """Return residual vibration relative to unshaped vibration, for fractions by which the assumed f_d is too high."""
+    """Return residual over unshaped vibration [-], for shares by which the assumed f_d is too high."""
     # `zeta` is both the assumed and the true damping ratio.
     return np.asarray(residual(1.0 / (1.0 + errors), zeta, shaper.impulses(1.0, zeta)))
 
@@ -17,8 +17,8 @@ def residual_over_error(shaper: Shaper, zeta: float, errors: Floats) -> Floats:
 def settling_time(shaper: Shaper, f_d: float, zeta: float, error: float) -> float:
     """Return the time from the unshaped stop until the mode stays below 5 % of its unshaped vibration [s].
 
-    It is the shaper's delay plus the decay of what is left, infinite without damping; the worse sign of
-    `error` counts.
+    This is the shaper's delay plus the time in which the remaining vibration decays, infinite without damping;
+    the worse sign of `error` counts.
     """
     times = []
     for side in (-error, error):

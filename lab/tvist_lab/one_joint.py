@@ -1,7 +1,7 @@
 """The arm of the paper's Figure 2: one flexible joint whose inertia changes as the arm folds.
 
-Inertia, frequency and damping are given in closed form; plucking the simulated arm confirms them. A joint's
-own rotation does not change the inertia about it, so the elbow's angle does. Both axes are vertical, so
+Inertia, frequency and damping are given in closed form; plucking the simulated arm confirms them. The inertia
+about the shoulder depends on the elbow's angle, but not on the shoulder's own. Both axes are vertical, so
 weight loads no joint. With the parallel-axis theorem for each body and the law of cosines for the distance of
 the forearm's centre of mass from the shoulder,
 

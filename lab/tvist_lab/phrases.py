@@ -12,7 +12,7 @@ def counted(count: int, what: str) -> str:
 
 
 def sample(count: int, what: str) -> str:
-    """Return the basis of a figure of `spread` or `either`: some things, or the median of many."""
+    """Return what a figure of `spread` or `either` is based on: a few things, or the median of many."""
     return f"{'median of ' if count >= QUANTILES_FROM else ''}{counted(count, what)}"
 
 

@@ -30,8 +30,8 @@ from tvist_protocol.stream import Event, State, Truth
 from tvist_server.recording.recorder import Recorder
 
 ALWAYS, PER_STATE = 30_000, 100
-"""Ticks that a recording may have, a minute, plus a number for each of its states: even ticks with missing
-states take time in a replay."""
+"""A recording may have as many ticks as one minute plus this number for each of its states: ticks without states
+also take time in a replay."""
 
 
 class ReplayError(TvistError):
@@ -52,8 +52,8 @@ class Replay:
 def replay(setup: Setup, journal: Sequence[Entry], states: Sequence[State]) -> Replay:
     """Give a new controller the same inputs at the same ticks, and compare its states with the recorded ones.
 
-    `states` start at the recorded controller's first tick. Raises ValueError if the setup is invalid, or its
-    plant gives the tick.
+    `states` start at the recorded controller's first tick. Raises ValueError if the setup is invalid, or if its
+    plant, such as a real arm, determines when ticks happen.
     """
     controller, presence, done, names = Controller(setup), Presence(), Replay(), known_fields(states)
     check_unpaced(controller.cycle.plant)
@@ -78,11 +78,11 @@ def replay_file(
     own_shapers: Sequence[OwnShaper] = (),
     plant: OwnPlant | None = None,
 ) -> Replay:
-    """Replay a recording with its own setup, and optionally record that to `output`.
+    """Replay a recording with its own setup, and optionally record the replay to `output`.
 
     `own_shapers` and `plant` come from files and are loaded again; a note reports each file that has changed.
     Raises ReplayError if the recording has no setup or starts too late, or if a shaper or plant is missing or
-    not needed; ValueError if the setup is invalid, or its plant gives the tick.
+    not needed; ValueError if the setup is invalid, or its plant determines when ticks happen.
     """
     if not content.start:  # empty in recordings made by another program
         raise ReplayError(
@@ -117,7 +117,7 @@ def replay_file(
 
 
 def _used(start: dict[str, Any], given: Sequence[OwnShaper]) -> tuple[list[OwnShaper], list[str]]:
-    """Return the shapers from files in the order of loading, and a note for each changed file."""
+    """Return the shapers from files in the order of the recording, and a note for each changed file."""
     try:
         recorded = checked(start.get("own_shapers", []), list[RecordedShaper])
     except ProtocolError as error:
@@ -195,7 +195,7 @@ def _write(setup: Setup, content: RecordingFile, done: Replay, output: Path) -> 
 
 def _tick(controller: Controller, setup: Setup, done: Replay) -> None:
     state, events = controller.tick()
-    controller.programs.sockets.orders.clear()  # what became of them is in the journal
+    controller.programs.sockets.orders.clear()  # the journal contains the results of these orders
     done.states.append(state)
     done.events += events
     if setup.truth and (truth := controller.truth()) is not None:

@@ -1,4 +1,4 @@
-"""Publish a recording on the network at its own time, by a server that accepts no commands."""
+"""Publish a recording on the network at its original pace, by a server that accepts no commands."""
 
 import asyncio
 from collections.abc import Callable, Iterator, Sequence
@@ -97,7 +97,7 @@ class Playback:
                     if due > now:
                         await asyncio.sleep(due - now)
                     elif self.states % 50 == 0:
-                        await asyncio.sleep(0)  # it is late, but has to notice that it is cancelled
+                        await asyncio.sleep(0)  # playback is late, but must notice if it is cancelled
                     self.states += 1
                     self._intake.tick = message.tick
                 self._gateway.publish(topic_of(message), message, encode(message))

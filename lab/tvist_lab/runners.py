@@ -31,7 +31,7 @@ class TaskError(Exception):
 
 @dataclass(frozen=True)
 class Failed:
-    """Why a task gave no result."""
+    """The outcome of a task that gave no result."""
 
     error: Exception  # exception of the work, or a `TaskError`
 
@@ -60,7 +60,7 @@ def outcomes(
             except Exception as error:  # noqa: BLE001  what a task contains may raise anything
                 yield index, Failed(TaskError(f"it cannot be pickled: {named(error)}"))
                 continue
-            with _group_signals_blocked():  # also in a process that this starts, until it ignores them
+            with _group_signals_blocked():  # also in a process that starts here, until it ignores signals
                 future = executor.submit(_attempt, work, packed)
             out[future] = index
             future.add_done_callback(arrived.put)
@@ -88,14 +88,14 @@ class InlineExecutor(Executor):
 
 @contextmanager
 def processes(number: int | None = None) -> Iterator[Executor]:
-    """Start `number` processes on this machine, by default one per core, which end with the block in any case."""
+    """Start `number` processes on this machine, by default one per core; they end with the block in any case."""
     with _group_signals_blocked():  # the process by which multiprocessing cleans up must outlive this one
         multiprocessing.resource_tracker.ensure_running()
     others = set(multiprocessing.active_children())
     pool = ProcessPoolExecutor(number or processors(), multiprocessing.get_context("spawn"), _begin)
     try:
         yield pool
-    except BaseException:  # what the processes still do is of no use
+    except BaseException:  # the results of running tasks are no longer needed
         for process in set(multiprocessing.active_children()) - others:
             process.kill()
         raise
@@ -105,7 +105,7 @@ def processes(number: int | None = None) -> Iterator[Executor]:
 
 
 def _begin() -> None:
-    """Make this process end exactly when the one that hands out the work does."""
+    """Let this process ignore signals to its group, and end only when the process that started it ends."""
     for number in OF_GROUP:
         signal.signal(number, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, OF_GROUP)
@@ -114,7 +114,7 @@ def _begin() -> None:
 
 @contextmanager
 def _group_signals_blocked() -> Iterator[None]:
-    """Delay signals while the block runs; processes that it starts inherit this."""
+    """Delay signals while the block runs; processes started by the block delay them, too."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, OF_GROUP)
     try:
         yield

@@ -94,7 +94,7 @@ async def _connect(
     while True:
         try:
             return await Robot.connect(endpoint, name)
-        except TvistError as error:  # it is not there, or says that it is starting
+        except TvistError as error:  # the robot is not there, or reports that it is starting
             if process.returncode is not None:
                 raise ServedError(
                     f"tvist serve ended with exit code {process.returncode}: {_last(told)}"

@@ -15,7 +15,7 @@ def summary(path: str | os.PathLike[str], recording: Recording) -> dict[str, Any
     """Describe a file that `tvist_lab.recordings.read` reads; times are in s on its own clock.
 
     `complete`, `dropped`, `replayable`, `from_tick` (the first tick if earlier ones were dropped) and
-    `messages` are null unless it is a recording of a served robot.
+    `messages` are null unless the file is a recording of a served robot.
     """
     path = Path(path)
     content: mcap_file.RecordingFile | None = None

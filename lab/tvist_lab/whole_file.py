@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import IO
 
 IN_PLACE = {errno.EBUSY, errno.EACCES, errno.EPERM, errno.EROFS, errno.ENAMETOOLONG}
-"""Errors with which a file cannot be replaced, but perhaps be written."""
+"""Errors after which a file that cannot be replaced may still be writable in place."""
 UNFINISHED = ".tmp"  # suffix of an incomplete file, which remains if the program is killed
 
 
@@ -34,10 +34,10 @@ def whole_file(path: Path) -> Iterator[IO[bytes]]:
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Write a file, all of it or nothing.
+    """Write a file completely, or leave it unchanged.
 
-    A link, a device such as /dev/stdout, and a file that cannot be replaced, such as a mount of its own, are
-    written in place.
+    A link, a device such as /dev/stdout, and a file that cannot be replaced, such as a mount point, are written
+    in place.
     """
     if path.is_symlink() or (path.exists() and (not path.is_file() or path.stat().st_nlink > 1)):
         path.write_bytes(content)

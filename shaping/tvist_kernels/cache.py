@@ -38,9 +38,9 @@ FORMAT = 2  # version of the format that `machine_code` writes; increase it with
 
 kernels: "list[KernelCache]" = []  # caches of all compiled functions that this process has imported
 OTHERS = 16
-"""Number of files of other versions of a kernel that stay, since several installations share the folder."""
+"""Number of files of other versions that are kept for each kernel, since installations share the folder."""
 SHIPPED = "tvist_compiled"  # package whose folder holds precompiled machine code, if it is installed
-unkept: dict[str, str] = {}  # why machine code could not be written, by folder
+unkept: dict[str, str] = {}  # reason why machine code could not be written, by folder
 _said: set[str] = set()  # warnings already given
 
 
@@ -106,7 +106,7 @@ class KernelCache:
         return f"{self.name}.{self.sources}-{machine}-{_short(str(sig))}.kernel"
 
     def _forget_older(self, written: Path) -> None:
-        """Remove older versions of this kernel on this machine, except the latest, which others may use."""
+        """Remove other versions of this kernel on this machine, except the newest `OTHERS` files."""
         same = written.parent.glob(f"{self.name}.*-{written.name.split('-')[-2]}-*.kernel")
         with contextlib.suppress(OSError):  # another process removes some
             others = [file for file in same if self.sources not in file.name]
@@ -114,17 +114,17 @@ class KernelCache:
 
 
 class _Content(CompileResultCacheImpl):
-    """numba's conversion of a compiled function; the base would also search for a folder to write to."""
+    """numba's conversion of a compiled function, without the base class's search for a folder to write to."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
-        # The base's constructor without its search for a folder; numba shows both values in warnings.
+        # Replaces the base's constructor, which searches for a folder; numba shows line and file in warnings.
         self._lineno = function.__code__.co_firstlineno
         self._py_file = function.__code__.co_filename
         self._locator = self
 
 
 def held(some: "Iterable[KernelCache]") -> "dict[KernelCache, list[Path]]":
-    """Return those of some kernels for which there is machine code for this processor, with the files."""
+    """Return the files with machine code for this processor, by kernel; kernels without such files are left out."""
     machines, listed, real = _machines(cpu_target.target_context), cache(_listed), cache(_real)
 
     def there(kernel: KernelCache, folder: Path) -> list[Path]:
@@ -134,7 +134,7 @@ def held(some: "Iterable[KernelCache]") -> "dict[KernelCache, list[Path]]":
             for machine in machines
             for file in listing.get(f"{kernel.name}.{kernel.sources}-{machine}", ())
         ]
-        # A folder without such files is not used, so it does not matter who can write there.
+        # Check a folder only if it has such files: it does not matter who can write to any other.
         place = real(folder) if files else None
         return [] if place is None else [place / file for file in files if _may_be_loaded(place / file)]
 
@@ -143,7 +143,7 @@ def held(some: "Iterable[KernelCache]") -> "dict[KernelCache, list[Path]]":
 
 
 def load_all(some: "Iterable[KernelCache]") -> bool:
-    """Load all machine code of some kernels, so that no call has to (milliseconds); return False if damaged."""
+    """Load the machine code of kernels, which takes milliseconds, before their first calls; False if damaged."""
     loaded = [kernel.load_file(file) for kernel, files in held(some).items() for file in files]
     return all(loaded)
 
@@ -179,13 +179,13 @@ def own_folder() -> Path:
 
 
 def places() -> list[Path]:
-    """Return the folders in which machine code is searched, in this order."""
+    """Return the folders that are searched for machine code, in the order of the search."""
     shipped = top(SHIPPED)
     return [own_folder(), *([] if shipped is None else [shipped.parent])]
 
 
 def _machines(target_context: Any) -> list[str]:
-    """Hashes of compiler versions and of each processor whose machine code runs here, this one first."""
+    """Return a hash of compiler versions and processor, first for this processor, then for a generic one."""
     python = (sys.implementation.cache_tag, getattr(sys, "abiflags", ""))
     versions = (FORMAT, python, numba.__version__, llvmlite.__version__)
     own = target_context.codegen().magic_tuple()
@@ -212,7 +212,7 @@ def _trusting(folder: Path) -> Iterator[None]:
         yield
     except trust.DistrustError as error:
         why = f"{error}, or delete {folder}; until then they are compiled again"
-        # Only once, and only in the main process.
+        # Give each warning once, and only in the main process.
         if why not in _said and multiprocessing.parent_process() is None:
             _said.add(why)
             warnings.warn(
@@ -228,7 +228,7 @@ def _write(file: Path, content: bytes) -> None:
     file = trust.make_folder(file.parent) / file.name
     draft = file.with_name(f"{uuid.uuid4().hex}.draft")
     try:
-        # With any umask, nobody else can write it.
+        # Nobody else can write the file, whatever the umask.
         flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
         with open(os.open(draft, flags, 0o644), "wb") as stream:  # noqa: PTH123  a descriptor
             stream.write(content)

@@ -1,7 +1,7 @@
-"""Turn a compiled kernel into bytes and back, so that loading one does only what running it needs.
+"""Turn a compiled kernel into bytes and back, so that loading it prepares only what is needed to run it.
 
 When numba loads a kernel, it prepares to compile others: it imports everything that it can compile, including SciPy if
-that is installed, and parses the intermediate code. Here both wait until something really is compiled.
+that is installed, and parses the intermediate code. Here neither happens until another kernel is compiled.
 """
 
 # numba's type information is incomplete.
@@ -49,7 +49,7 @@ def from_bytes(target: Any, content: bytes) -> Any:
     def module() -> Any:
         return binding.parse_bitcode(intermediate)
 
-    # This is only called when another kernel, which calls this one, is compiled.
+    # numba calls this only when it compiles another kernel that calls this one.
     result.library._get_module_for_linking = module  # noqa: SLF001
     return result
 

@@ -42,7 +42,7 @@ class Filter(Forked, ABC):
             [-]. The generator of the reference can stay below its limit by this share.
         surplus: Largest shares by which the shaped velocity and acceleration exceed those of a reference at the arm's
             limits [-]. Only the caller, who knows the arm, can set them; see `mean_delay_of`.
-        clipped: Whether a delay exceeded the buffer, or a mode its estimator's bounds, at the last tick.
+        clipped: Whether at the last tick a delay exceeded the buffer, or a mode exceeded the estimator's bounds.
         feed_forward: Feed-forward that the drives need for the filter to work as designed.
         fault: Why the shaper's function failed in its last call; None if it did not. A filter cannot stop abruptly
             during a motion, so it continues with its last weights, and the caller should stop the motion.
@@ -73,7 +73,7 @@ class Filter(Forked, ABC):
     @property
     @abstractmethod
     def delay(self) -> float:
-        """Time of the last tick's last weight [s]; the shaped reference ends later by this time."""
+        """Longest delay with a weight at the last tick [s]; the shaped reference ends later by this time."""
 
     @property
     @abstractmethod
@@ -81,9 +81,9 @@ class Filter(Forked, ABC):
         """Mean delay of the last tick's weights [s]: the lag behind a reference of constant velocity."""
 
     def mean_delay_of(self, f_d: Floats, zeta: Floats) -> float | None:  # noqa: ARG002  unless overridden
-        """Mean delay of the weights for modes [s]; None if it is the same for all.
+        """Mean delay of the weights for given modes [s]; None if it does not depend on the modes.
 
-        While it shrinks at a rate Ḋ, the shaped velocity is 1 - Ḋ times the reference's.
+        While the mean delay changes at a rate Ḋ, the shaped velocity is 1 - Ḋ times the reference's.
 
         Args:
             f_d: Damped frequencies [Hz], shape (modes,).

@@ -140,7 +140,7 @@ class DelayLine(Forked):
         return self.ring[(self.head - np.arange(count - 1, -1, -1)) % self.capacity]
 
     def take_over(self, other: "DelayLine") -> None:
-        """Copy the content of another line; if that is shorter, its oldest sample fills the rest.
+        """Copy the content of another line; if the other line is shorter, its oldest sample fills the rest.
 
         Args:
             other: The line to copy from; it is not changed.
@@ -172,7 +172,7 @@ class DelayLine(Forked):
             out: Array that receives y, shape (joints,).
 
         Raises:
-            DelayError: A delay is outside that range or not a number; `out` is not changed.
+            DelayError: A delay is not a number or not from 0 to `max_delay`; `out` is not changed.
         """
         refused = gather(self.ring, self.head, A, delays, self.scratch, out)
         if refused >= 0:

@@ -56,7 +56,7 @@ def blend(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops 
     `old` and `new` are the filters' outputs at the last three ticks, the present one last [rad], shape (3, joints), and
     `out` the fade's, whose last row is written. `progress` is what the previous tick returned: s [-], ṡ [1/s] and s̈
     [1/s²]. `limits` are the velocity [rad/s], acceleration [rad/s²] and jerk [rad/s³] of every joint. `lag` is how much
-    the new filter's mean delay is longer [s], and its rate of change [-].
+    longer the new filter's mean delay is than the old one's [s], and the rate of change of this difference [-].
     """
     share, rate, slope = progress
     velocity, acceleration, jerk = limits
@@ -78,7 +78,7 @@ def blend(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops 
     left, push = 1.0 - share, PUSH * jerk / widest
     safe = min(2.0 / QUICKEST, 0.5 * push ** (1.0 / 3.0) * (6.0 * left) ** (2.0 / 3.0))
     safe = min(safe, min(jerk / acceleration, 0.2 / period) * left)
-    # The room is what the motion leaves after another tick. If it could take all of it in a tick, assume half.
+    # Room: acceleration that is left after one more tick at the jerk limit, which is assumed to use half at most.
     counted = acceleration - max(MARGIN * acceleration, min(jerk * period, 0.5 * acceleration))
     # Bounds for stopping s after the motion has taken the room away, and for moving s without room.
     brake, closed, coast, back = math.inf, math.inf, math.inf, math.inf
@@ -159,7 +159,7 @@ def blend(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops 
 
 
 class Fade(Forked):
-    """Shapes like one filter first and like another in the end, and keeps a motion's limits in between.
+    """Changes from one filter to another during a motion, and keeps the motion's limits meanwhile.
 
     As long as the reference keeps limits of velocity, acceleration and jerk, the output keeps those of velocity and
     acceleration. If one of the filters exceeds them by itself, as time-varying ones slightly do, the output exceeds

@@ -27,7 +27,7 @@ def words(error: BaseException) -> str:
 
 
 def _place(error: BaseException) -> str:
-    """Return where the user's file raised an error, as a phrase: the last line in the first foreign file."""
+    """Return as a phrase where a user's file raised an error: file and last line of the first file outside ours."""
     lines: dict[str, int] = {}
     for frame, line in walk_tb(error.__traceback__):
         file = frame.f_code.co_filename

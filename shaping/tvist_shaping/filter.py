@@ -108,7 +108,7 @@ class TvistFilter(Filter):
 
     @property
     def delay(self) -> float:
-        """Time of the last tick's last impulse [s]; the shaped reference ends later by this time."""
+        """Delay of the last impulse at the last tick [s]; the shaped reference ends later by this time."""
         return self._work.item(1, -1) if self._impulses is None else self._impulses.duration
 
     @property
@@ -149,7 +149,7 @@ class TvistFilter(Filter):
         self._suppress(modes)
 
     def _modes(self) -> tuple[Floats, Floats]:
-        """Return the modes, through a low-pass if they may change abruptly, which keeps the limits."""
+        """Return the modes; if they may change abruptly, smooth them by a low-pass, so that limits are kept."""
         modes = super()._modes()
         if not self.estimator.abrupt:
             return modes

@@ -85,7 +85,7 @@ def shape_all(
     modes: Floats,
     out: Floats,
 ) -> int:
-    """Shape samples with the paper's estimator; return their number before a mode out of range."""
+    """Shape samples with the paper's estimator; stop at a mode out of range, and return the number shaped."""
     for i in range(samples.shape[0]):
         head = head + 1 if head + 1 < ring.shape[0] else 0
         for j in range(samples.shape[1]):

@@ -87,7 +87,7 @@ class FirShaper:
         return np.pad(given, (0, self.taps - given.size))
 
     def impulses(self, f_d: float, zeta: float) -> Impulses:
-        """Return the taps for equal modes as impulses, to compute the shaper's other properties.
+        """Return the taps as impulses if all modes are equal, to compute the shaper's other properties.
 
         Args:
             f_d: Damped frequency of the mode [Hz].

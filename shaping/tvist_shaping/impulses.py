@@ -50,7 +50,7 @@ class Train:
     a: Floats  # amplitudes [-], shape (N,), sum positive
     periods: Floats  # times in damped periods [-], shape (N,), ascending from 0
     zeta_max: float = 1.0  # damping ratios must stay below this [-]
-    instead: str = ""  # what to use for higher ones
+    instead: str = ""  # what to use for higher damping ratios
 
     @classmethod
     def spaced(cls, a: Sequence[float] | Floats, distance: float) -> "Train":
@@ -74,7 +74,7 @@ class Train:
         """
         check_mode(f_d, zeta, self.zeta_max, self.instead)
         A, tau = np.empty((2, len(self.a)))
-        # Not the compiled one, which would take longer to load.
+        # Call the Python function, since loading the compiled one would take longer.
         _decay(self.a, self.periods, f_d, zeta, A, tau)
         return Impulses._by_construction(A, tau)  # noqa: SLF001  both come from this package
 

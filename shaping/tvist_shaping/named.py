@@ -24,9 +24,9 @@ AnyShaper: TypeAlias = Shaper | FirShaper  # types that a user's own shaper may 
 
 
 SLOW_HZ = 5.5
-"""Lower bound of an arm's frequencies [Hz] below which the designs' times grow with the longest period."""
+"""If an arm's lowest frequency is below this [Hz], the designs' times grow with the longest period."""
 LIGHT = 0.040
-"""Mean delay at q = 0 of zero-vibration shapers for the two lowest modes above which they grow, too [s].
+"""If ZV shapers of the two lowest modes have a longer mean delay than this at q = 0 [s], the designs' times grow, too.
 
 The less an arm is damped, the later its weights have to be.
 """
@@ -51,8 +51,8 @@ DESIGNS: Mapping[str, Callable[[float], Design]] = MappingProxyType(
 )
 """Designs with constant mean delay for an arm's four lowest modes; the argument is the factor of their times.
 
-They are one with a smaller residual, one that is shorter, one for motions with a known end, and one for what elastic
-feed-forward leaves.
+`auto` has a smaller residual, `short` is shorter, `auto-target` is for motions with a known end, and `elastic-auto`
+removes the vibration that elastic feed-forward leaves.
 """
 SMOOTHED: Mapping[str, FeedForward] = MappingProxyType(
     {"elastic": "elastic", "elastic-position": "elastic-position"}
@@ -62,7 +62,7 @@ SMOOTHING = 40  # length of the smoothing if the name contains none [ms]
 SMOOTHINGS = range(8, 62, 2)
 """Lengths that a name may contain, as in `elastic-16` [ms].
 
-Shorter ones leave the lead too little torque, and longer ones gain little.
+With a shorter one, the torque is too small for elastic feed-forward; a longer one gains little.
 """
 FIRST = 0.63  # share of the first of two running means in the total length, tuned at 40 ms [-]
 _LENGTH = re.compile(r"(.+)-(0|[1-9][0-9]{0,8})")
@@ -86,7 +86,7 @@ USES: Mapping[str, str] = MappingProxyType(
         "auto": "streams and whatever has no known end, by drives that take no torques",
     }
 )
-"""What each of these is best for, as measured: docs/how-to/evaluate-a-shaper.md has the figures."""
+"""Purpose for which each filter is best, as measured; docs/how-to/evaluate-a-shaper.md has the figures."""
 
 PERIOD = 0.002  # tick of every filter that is created by name [s]
 _NAME = re.compile(r"[a-z0-9][a-z0-9_.,()-]{0,63}")

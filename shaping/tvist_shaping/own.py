@@ -103,7 +103,7 @@ def longest(shaper: Shaper, f_d_min: float) -> float:
 def _tried(shaper: Shaper | FirShaper, tried: Floats = _F_D) -> tuple[float, float, float]:
     """Return the longest duration in damped periods, the largest sum of magnitudes, and the longest duration [s].
 
-    They are the largest over those of the tried modes for which the function works.
+    Each is the largest value over the tried modes; modes for which the function fails are left out.
     """
     zeta_max = shaper.zeta_max if isinstance(shaper, Shaper) else 1.0
     undeclared = shaper if isinstance(shaper, Shaper) else replace(shaper, peak=1e300)

@@ -56,7 +56,7 @@ def specified(low: float, high: float, V: float) -> tuple[Floats, Floats]:
 
 
 def _followed(a: Floats, x: Floats, humps: Floats, ratio: float, V: float) -> tuple[Floats, Floats]:
-    """Follow the train whose last extreme is the band's upper end, from where that is a hump down to `ratio`."""
+    """Solve for the train whose last extreme is the band's upper end, from one at a hump down to `ratio`, in steps."""
     N, pairs = a.size, a.size // 2
     free = (N - 1) // 2  # free amplitudes; the innermost pair or the middle one makes the sum 1
     signs = (-1.0) ** np.arange(1, N - 1)

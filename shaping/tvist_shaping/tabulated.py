@@ -29,7 +29,7 @@ class Tabulated(ABC):
     def __init__(
         self, start: Floats, zeta_max: float, instead: str, duration_periods: float | None = None
     ) -> None:
-        """Compute the polynomials, or only at the first evaluation if the longest duration [periods] is given.
+        """Compute the polynomials; if the longest duration [periods] is given, only at the first evaluation.
 
         `start` has the unknowns without damping; `instead` says what to use beyond `zeta_max`.
         """

@@ -2,7 +2,7 @@
 
 Commands are `state` (publish the present state), `close` (complete the recording and end) and `leave` (end).
 Answers are lines of JSON: at first the robot's endpoint or an error; after `close` or `leave` the number of
-clients of UR's interfaces, until whose end the robot continues, since ur_rtde aborts its process when its
+clients of UR's interfaces. The robot continues until these have left, since ur_rtde aborts its process if its
 robot disappears. When the socket closes because the test's process has ended, the robot ends in any case.
 """
 

@@ -65,7 +65,7 @@ class History:
             self._early.append(truth)
 
     def on_state(self, state: "State") -> None:
-        """Add a state; the one before the first tick measures nothing and is ignored."""
+        """Add a state; ignore the one before the first tick, which contains no measurements."""
         if state.tick == 0:
             return
         row = HistoryRow(state)

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 Part = dict[str, Any]  # what a marker adds to the description of a robot
-FAULTS = "tvist_faults"  # the one marker that adds up
+FAULTS = "tvist_faults"  # the only marker of which all occurrences count
 FILES = (".toml", ".json")  # suffixes of files with a state
 ROBOTS = pytest.StashKey[list[Any]]()  # a test's robots, each a `serving.RobotOfTest`
 
@@ -151,7 +151,7 @@ def described() -> list[str]:
 
 
 def combined(item: pytest.Item) -> Part:
-    """Return the combined description of all markers of a test; the nearest of equal ones counts, but faults add up."""
+    """Return what the markers of a test describe; of a repeated marker only the nearest counts, but all faults do."""
     found: Part = {}
     for name, function in MARKERS.items():
         if name != FAULTS and (marker := item.get_closest_marker(name)) is not None:

@@ -63,7 +63,7 @@ class RobotProcess:
             self.kill()
 
     def _leave(self, order: bytes) -> None:
-        """End the robot; while a client of UR's interfaces is connected, it continues until that is gone."""
+        """Tell the robot to end; it continues while clients of UR's interfaces are connected."""
         if self.closed:
             return
         with contextlib.suppress(OSError):
@@ -77,7 +77,7 @@ class RobotProcess:
         self.kill()
 
     def forget(self) -> None:
-        """Leave a robot with clients alone: it ends when this process has ended, together with its clients."""
+        """Let a robot that has clients continue; it ends when this process ends, and the clients with it."""
         self._connection.detach()
 
     def kill(self) -> None:
@@ -92,7 +92,7 @@ class RobotProcess:
         self.closed = True
 
     def _wait(self) -> None:
-        """Wait until the process has ended, which closes its end of the socket."""
+        """Wait until the robot's process has ended: that closes the socket."""
         while self._connection.recv(4096):
             pass
 

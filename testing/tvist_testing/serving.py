@@ -29,7 +29,7 @@ class RobotOfTest:
 
     served: RobotProcess
     recording: Path  # in a folder that is removed after the test
-    kept: Path  # folder to which both are moved if the test fails
+    kept: Path  # folder to which recording and log are moved if the test fails
     seed: int
 
     @property

@@ -33,7 +33,7 @@ class Module:
 
     @property
     def pages(self) -> dict[Path, str]:
-        """Its pages as Markdown with placeholders that MkDocs fills."""
+        """Text of each page of the module, in Markdown with placeholders that MkDocs fills."""
         if not self.parts:
             return {self.page: f"# `{self.name}`\n\n::: {self.name}\n"}
         rows, found = "", dict[Path, str]()

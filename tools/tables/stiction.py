@@ -1,4 +1,4 @@
-"""How exactly stiction has to be known: moves of `ur5e_stiction` by controllers with wrong friction parameters."""
+"""Show how exactly stiction must be known: move `ur5e_stiction` by controllers with wrong friction parameters."""
 
 from functools import partial
 

@@ -57,26 +57,26 @@ class Jog(Asked, tag="jog", frozen=True):
 
 
 class Shape(Asked, tag="shape", frozen=True):
-    """Choose the shaper, also in motion, and its number of modes, which None keeps."""
+    """Choose the shaper and its number of modes, even while the arm moves; None keeps the number."""
 
     shaper: str
     modes: Annotated[int, Meta(ge=1)] | None = None
 
 
 class Speed(Asked, tag="speed", frozen=True):
-    """Set the speed slider, also in motion."""
+    """Set the speed slider, even while the arm moves."""
 
     fraction: Annotated[float, Meta(ge=0.0, le=1.0)]
 
 
 class Declare(Asked, tag="declare", frozen=True):
-    """Declare a payload mass, also in motion [kg]."""
+    """Declare a payload mass [kg], even while the arm moves."""
 
     mass: Mass
 
 
 class Carry(Asked, tag="carry", frozen=True):
-    """Let the simulated arm carry a mass; it must be at rest [kg]."""
+    """Let the simulated arm, which must be at rest, carry a mass [kg]."""
 
     mass: Mass
 
@@ -88,7 +88,7 @@ class Fault(Asked, tag="fault", frozen=True):
 
 
 class Ready(Asked, tag="ready", frozen=True):
-    """Release what a client can release, and switch the power on."""
+    """Release the stops that a client can release, and switch the power on."""
 
 
 Message = (

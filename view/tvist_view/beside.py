@@ -20,7 +20,7 @@ from tvist_view.look import Look
 from tvist_view.pilot import Pilot, carry, declare, go, motion
 from tvist_view.signals import moves, signals_of
 
-REST = 500  # ticks recorded after a motion; before it, the arm comes to rest for half as many
+REST = 500  # ticks recorded after a motion; half as many pass at rest before the motion
 POINTS = 600  # points of a curve on the page
 
 
@@ -52,7 +52,7 @@ def _gathered(robot: Robot) -> Iterator[MotionRecord]:
 
 
 def _curves(look: Look, *runs: MotionRecord) -> dict[str, Any]:
-    """|α| of both motions over the time since their starts, and when the reference of the first one stopped."""
+    """Return |α| of both motions over the time since each started, and when the first one's reference stopped."""
     signals = [signals_of(look, run.states, {truth.tick: truth for truth in run.truths}) for run in runs]
     spans = [moves(one) or (one.time[0], one.time[0]) for one in signals]
     shown = [one.between(begun, one.time[-1]) for one, (begun, _) in zip(signals, spans, strict=True)]
@@ -126,7 +126,7 @@ class Doer:
                 self.pilot.do(tab, lambda arm: self._compare(arm, message))
 
     async def _compare(self, arm: Arm, message: asked.Compare) -> None:
-        """Make a motion without and with a shaper, show both and what the judge says, and restore the shaper."""
+        """Make a motion without and with a shaper, show both and their comparison, and restore the shaper."""
         info = await self.robot.info()
         shaper = message.shaper if message.shaper not in {"", "none"} else usual(info)
         runs = []

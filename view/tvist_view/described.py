@@ -11,11 +11,11 @@ from tvist_view.look import Look, Meshes
 
 NO_TRUTH = "this robot does not publish how it bends; simulated robots do, for pages on the same machine"
 REAL = "a real arm does not report how it bends"
-USUAL = ("auto", "zv")  # shapers to compare with none while none is in use; the first one that the robot has
+USUAL = ("auto", "zv")  # shapers to compare with `none`, for a robot that uses none: the first that it has
 MOVES = 0.05  # joint velocity above which a watched robot counts as moving [rad/s]
 STOPS = {"protective_stop", "safety_stop"}
 
-Step = tuple[bool, str, str]  # whether it is done, what to do, and how
+Step = tuple[bool, str, str]  # step of a checklist: whether it is done, what to do, and how
 
 
 def described(info: Info, look: Look, robots: list[str], meshes: Meshes) -> dict[str, Any]:
@@ -41,7 +41,7 @@ def described(info: Info, look: Look, robots: list[str], meshes: Meshes) -> dict
 
 
 def usual(info: Info) -> str:
-    """Return the shaper to compare with none while none is in use."""
+    """Return the shaper to compare with `none` if the robot uses no shaper."""
     return next((name for name in USUAL if name in info.shapers), info.shapers[-1])
 
 
@@ -82,10 +82,10 @@ def _word(kind: type[RobotMode] | type[SafetyMode], number: int) -> str:
 
 
 class ObservedArm:
-    """What a real robot has done since the page shows it."""
+    """What a real robot has done since this page first showed it."""
 
     def __init__(self) -> None:
-        self.seen: set[str] = set()  # kinds of events, and what else the checklist looks at
+        self.seen: set[str] = set()  # kinds of events, and what else happened: "program", "moved", "compared"
 
     def steps(self, info: Info, state: State, io: Io | None) -> list[Step]:
         """Return the checklist of a robot that is watched or moved through its own controller; empty for others."""

@@ -64,7 +64,7 @@ class Pilot:
             return True
 
     async def give_back(self, tab: int) -> None:
-        """Stop a tab's motion and give its control back, also if it is closed; others keep theirs."""
+        """If a tab has control, stop its motion and give control back; also called when a tab is closed."""
         async with self._changing:  # waits for control that is being taken
             if self.holder != tab:
                 return
@@ -79,7 +79,7 @@ class Pilot:
                     await held.aclose()
 
     async def heard(self, control: str | None) -> None:
-        """Give control back if the robot reports that this page no longer has it."""
+        """If the robot reports that this page has lost control, take control from the tab that had it."""
         if self.holder is not None and not self._changing.locked() and control != self.client:
             self._say("this page has lost control of the robot")
             await self.give_back(self.holder)
@@ -93,7 +93,7 @@ class Pilot:
         """Stop the arm, no matter which client moves it; this needs no control."""
         self._jog_until, self._jog_barred = 0.0, True
         if self._task is not None:
-            self._task.cancel()  # a motion may have a further leg
+            self._task.cancel()  # a motion may have further poses
         await self._told(self._robot.stop())
 
     def do(self, tab: int, doing: Doing) -> None:
@@ -111,7 +111,7 @@ class Pilot:
         return arm is not None and await self._told(doing(arm))
 
     def _lent(self, tab: int) -> Arm | None:
-        """Return the arm if the tab has control, else tell it."""
+        """Return the arm if the tab has control; else show a message and return None."""
         if self.holder != tab:
             self._say("this tab does not have control: take it first")
             return None
@@ -125,7 +125,7 @@ class Pilot:
         now = asyncio.get_running_loop().time()
         pressed = now - self._jog_heard > DEADMAN_S or self._jog != (joint, direction)
         self._jog_heard, self._jog = now, (joint, direction)
-        # Only the second message moves the arm, so that a hidden tab, whose messages are a second apart, never does.
+        # The first message does not move the arm. A hidden tab sends one a second, so each of them counts as first.
         if pressed:
             self._jog_barred = False
             return
@@ -190,7 +190,7 @@ async def go(arm: Arm, q: Sequence[float]) -> None:
 
 
 async def motion(arm: Arm, poses: Sequence[Sequence[float]]) -> None:
-    """Move to the first pose, unless the arm is there, and on through the others."""
+    """Move to the first pose, unless the arm is there, then to each of the others."""
     for place, q in enumerate(poses):
         at = (await arm.robot.state()).target_q
         if place or max(abs(a - b) for a, b in zip(at, q, strict=True)) > 1e-6:
@@ -209,7 +209,7 @@ async def declare(arm: Arm, mass: float) -> None:
 
 
 def _scaled(payload: Payload, mass: float) -> Payload:
-    """Return a payload of the same shape with another mass; if there is none yet, a steel disc of 10 cm."""
+    """Return a payload of the same shape with another mass; if its mass is zero, a steel disc of 10 cm diameter."""
     if payload.mass <= 0.0:
         across, along = 0.05**2 / 4 * mass, 0.05**2 / 2 * mass
         return make_payload(mass, (0.0, 0.0, 0.03), (across, 0.0, 0.0, across, 0.0, along))

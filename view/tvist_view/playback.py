@@ -34,6 +34,6 @@ def said(verdict: Verdict, shaper: str, motion: str) -> dict[str, Any]:
 
 
 async def meet(tab: Tab) -> None:
-    """Wait until a tab closes, since it already has everything it needs."""
+    """Wait until a tab closes; the page already contains all its data."""
     async for _ in tab:
         await asyncio.sleep(0)

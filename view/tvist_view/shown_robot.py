@@ -1,4 +1,4 @@
-"""A robot on the network that tabs show: found, described, subscribed to while a tab shows it, and moved."""
+"""A robot on the network that tabs show: find it, describe it, subscribe to it while it is shown, and move it."""
 
 import asyncio
 import contextlib
@@ -68,11 +68,11 @@ class Watcher:
         self.put("notice", {"text": sentence})
 
     async def tell(self) -> None:
-        """Send the tab what is new, frame by frame; a slow tab gets fewer frames."""
+        """Send the tab new messages and states, frame by frame; a slow tab gets fewer frames."""
         loop, note = asyncio.get_running_loop(), ""
         due = loop.time()
         for number in itertools.count():
-            due = max(due, loop.time())  # a late frame delays the following ones
+            due = max(due, loop.time())  # after a late frame, do not hurry to make up for the delay
             await asyncio.sleep(due - loop.time())
             due += FRAME_S
             waiting, self.waiting = self.waiting, []

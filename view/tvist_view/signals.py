@@ -101,7 +101,7 @@ class LatestSignals:
         self._states.append(message)
 
     def row(self) -> list[float] | None:
-        """Return the arm's position at the latest tick that is completely known; None before the first one."""
+        """Return the arm's position at the latest tick whose state and truth are known; None before the first."""
         shown = self._shown if self._shown is not None else self.state
         return None if shown is None else self._look.row(shown, self._truths.get(shown.tick))
 
@@ -140,7 +140,7 @@ def moves(signals: Signals) -> tuple[float, float] | None:
 
 
 def rests_since(signals: Signals) -> tuple[float, float] | None:
-    """Return when the reference and the shaped reference of the last motion came to rest [s]; None if they move."""
+    """Return when the last motion's reference and shaped reference came to rest [s]; None while they move."""
     moving = np.flatnonzero(signals.unshaped > RESTS / 0.002**2)
     shaped = np.flatnonzero(signals.acceleration > RESTS / 0.002**2)
     if not len(moving) or not len(shaped) or shaped[-1] >= len(signals.time) - 2:

@@ -1,4 +1,4 @@
-"""The page's server: one page, and a WebSocket for each tab. By default only this machine can reach it."""
+"""The page's server: one page, and a WebSocket for each tab. By default only this machine can reach the server."""
 
 import gzip
 import ipaddress
@@ -134,7 +134,7 @@ def _found(kind: str, content: bytes) -> Response:
 
 
 def _may(request: Request, *, anywhere: bool) -> bool:
-    """Whether a request comes from the page itself or from a program.
+    """Whether a request comes from the page itself or from a program, rather than from another site.
 
     Browsers let any site open a WebSocket to this machine, with the site in the header Origin. The header
     Host reveals a site whose name resolves to this machine.

@@ -1,4 +1,4 @@
-"""Find in logs of a robot's motions what rings, and recommend a shaper."""
+"""Find in logs of a robot's motions which modes vibrate after stops, and recommend a shaper."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -15,12 +15,12 @@ from tvist_lab.metrics.measured_motion import still_driven
 from tvist_lab.metrics.ring_down import SKIP, WINDOWS
 from tvist_lab.recordings.recording import MissingColumnError
 
-EARLY = 0.15  # accepted settling after the earliest shaper, relative to that without any [-]
-CLOSE = 5.0  # vibration that a shaper may leave beyond the least of these [percentage points]
+EARLY = 0.15  # accepted settling time beyond the shortest one, as a share of that without a shaper [-]
+CLOSE = 5.0  # vibration that a shaper may leave beyond what the best one leaves [percentage points]
 SIMPLE = (ROBOT, ONE, EACH)  # where modes can come from, the simplest first
 RIPPLES = ("actual_qd", "actual_current", "actual_moment", "actual_q")
-"""Columns in which a joint shows that the arm shakes it."""
-LIGHTEST = 0.005  # smallest damping ratio of an arm [-]; anything damped less is hum of the sensor
+"""Columns in which vibration of the arm may be visible in a joint."""
+LIGHTEST = 0.005  # smallest damping ratio of an arm [-]; a signal with less is interference in the sensor
 AGREED = 2  # smallest number of motions that must show the same frequency
 
 
@@ -36,9 +36,9 @@ class RingingMode(NamedTuple):
     zeta_interval: tuple[float, float]
     """From the lowest to the highest end of the motions' 95 % intervals [-]."""
     motions: int
-    """Number of motions in which it rings."""
+    """Number of motions after which the mode vibrates."""
     amplitude: float
-    """Its largest |α| at a stop [m/s²]."""
+    """Largest |α| of the mode at a stop [m/s²]."""
 
 
 @dataclass(frozen=True)
@@ -50,11 +50,11 @@ class Advice:
     quiet: Sequence[StopWithRest]
     """Unshaped stops without noticeable vibration."""
     shaped: Sequence[tuple[int, int, str]]
-    """Motions that already had a shaper: index of the file, number in it, and the shaper's name if known."""
+    """Motions that already had a shaper: index of the file, number in the file, and the shaper's name if known."""
     refused: Sequence[tuple[int, int, str]]
-    """Motions that could not be measured: index of the file, number in it, and the reason."""
+    """Motions that could not be measured: index of the file, number in the file, and the reason."""
     modes: Sequence[RingingMode]
-    """Modes that ring; the mode of most motions comes first."""
+    """Modes that vibrate after stops; the one found in most motions comes first."""
     options: Sequence[Option]
     """All shapers, by settling time."""
     best: Option | None
@@ -64,11 +64,11 @@ class Advice:
     slowed_percent: float | None = None
     """Vibration that slower limits with the same added time would leave, according to the modes, median [%]."""
     weak: tuple[float, int] | None = None
-    """If nothing measured the tool: frequency seen in the joints [Hz], and the number of motions that show it."""
+    """If the logs have no tool acceleration: frequency seen in the joints [Hz], and number of motions showing it."""
 
     @property
     def still_s(self) -> float:
-        """Median settling time of the tool without a shaper [s]; infinite if it does not settle within the rest."""
+        """Median settling time of the tool without a shaper [s]; infinite if the recorded rests are too short."""
         return median(one.unshaped.still for one in self.ringing)
 
 
@@ -127,7 +127,7 @@ def recommended(found: Sequence[Option], still: float) -> Option | None:
 
 
 def ringing_modes(stops: Sequence[StopWithRest]) -> list[RingingMode]:
-    """Group the modes of stops that differ by at most 7 % in frequency; the mode of most motions comes first."""
+    """Group modes of stops if their frequencies differ by at most 7 %; the mode found in most motions comes first."""
     pool = [(place, mode) for place, one in enumerate(stops) for mode in one.result.modes]
     found = []
     while pool:
@@ -158,7 +158,7 @@ def _median(values: Iterable[float | None]) -> float | None:
 
 
 def frequency_of_joints(logs: Sequence[MeasuredRecording]) -> tuple[float, int] | None:
-    """Return f_d [Hz] seen in encoders or currents after stops, and the number of motions that show it.
+    """Return f_d [Hz] seen in encoders or currents after stops, and the number of motions that show this f_d.
 
     This is weak evidence, since joints hardly feel the tool. None if no two motions agree within 7 %.
     """

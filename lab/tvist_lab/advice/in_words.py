@@ -106,7 +106,7 @@ def _reasons(advice: Advice, best: Option) -> list[str]:
 
 
 def command(advice: Advice, logs: Sequence[MeasuredRecording]) -> list[str]:
-    """Return the lines that apply an advice; none if there is nothing to apply."""
+    """Return the lines of code or commands that apply an advice; none if there is nothing to apply."""
     # A robot of this controller gets the shaper over the network; the reference of another robot goes through
     # the library.
     best = advice.best

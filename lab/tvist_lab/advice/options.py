@@ -1,4 +1,4 @@
-"""Candidate shapers, each judged on other stops than those its modes were found in, and alternatives to shaping."""
+"""Candidate shapers, judged on stops that were not used to find their modes, and alternatives to shaping."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -35,9 +35,9 @@ class Aim:
     scope: str  # `ONE`, `EACH` or `ROBOT`
     modes: Mapping[int, Modes]  # modes to use from now on, by number of the motion
     judged: Mapping[StopWithRest, Modes]
-    """Modes by which each stop is judged, found without it if there are repetitions."""
+    """Modes for judging the shaper on each stop; if there are repetitions, found without this stop."""
     optimistic: frozenset[StopWithRest] = frozenset()
-    """Stops that are judged by modes found in themselves, since nothing else was recorded."""
+    """Stops that had to be judged by modes found in the same stop, since no other was recorded."""
 
 
 @dataclass(frozen=True)
@@ -49,8 +49,8 @@ class Option:
     left: Mapping[StopWithRest, ResidualVibration]
     """Predicted vibration after each stop, by convolution."""
     by_modes: Mapping[StopWithRest, float]
-    """Vibration left according to each stop's modes, as root of the share of their energy [-]; only where
-    modes are known."""
+    """Predicted share of each stop's vibration that is left, as root of the energy of its modes [-]; only for
+    stops with known modes."""
     added: Mapping[StopWithRest, float]
     """Time by which each motion ends later [s]."""
 
@@ -61,7 +61,7 @@ class Option:
 
     @property
     def name(self) -> str:
-        """The shaper with the number of modes."""
+        """Name of the shaper, with the number of modes."""
         return f"{self.shaper}, {self.count} mode{'' if self.count == 1 else 's'}"
 
     @cached_property
@@ -86,7 +86,7 @@ class Option:
 
     @property
     def still_s(self) -> float:
-        """Median settling time after the unshaped stop [s]; infinite if it does not settle within the rest."""
+        """Median settling time after the unshaped stop [s]; infinite if the recorded rests are too short."""
         return median(left.still for left in self.left.values())
 
     @property
@@ -101,7 +101,7 @@ def impulses_of(shaper: str, modes: Modes) -> Impulses:
 
 
 def options(stops: Sequence[StopWithRest]) -> list[Option]:
-    """Judge every catalogue shaper on one or more ringing stops; leave out shapers that cannot be judged on all."""
+    """Judge every catalogue shaper on stops with vibration; leave out shapers that cannot be judged on all of them."""
     return [
         option
         for aim in _aims(stops)
@@ -120,7 +120,7 @@ def _judged(name: str, aim: Aim) -> Option | None:
             impulses = impulses_of(name, modes)
             left[stop] = stop.left(impulses)
         except (NotMeasurableError, ShapingError):
-            return None  # one that some motion cannot be judged by is no choice for all
+            return None  # leave out a shaper that cannot be judged on every stop
         added[stop] = float(impulses.tau[-1])
         if (share := left_of_modes(stop, partial(residual, impulses=impulses))) is not None:
             by_modes[stop] = share
@@ -128,9 +128,9 @@ def _judged(name: str, aim: Aim) -> Option | None:
 
 
 def left_of_modes(stop: StopWithRest, left: Callable[[float, float], Any]) -> float | None:
-    """Return the root of the share of energy left of a stop's modes [-]; None if no modes are known.
+    """Return the share of a stop's vibration that is left, as root of its modes' energy [-]; None without modes.
 
-    `left` gives for f_d [Hz] and ζ of a mode the share of its amplitude that is left [-].
+    `left` is a function from a mode's f_d [Hz] and ζ to the share of its amplitude that is left [-].
     """
     before = after = 0.0
     for mode in stop.result.modes:
@@ -154,7 +154,7 @@ def smoothed(stop: StopWithRest, added: float) -> float | None:
 
 
 def slowed(stop: StopWithRest, added: float) -> float | None:
-    """Return the vibration left of a stop's modes if the whole motion took `added` [s] longer [%].
+    """Return the share of a stop's vibration that is left if the whole motion takes `added` [s] longer [%].
 
     A mode with poles λ is left with an amplitude in proportion to |∫ v(t) exp(λ* (t - T)) dt|, where v is the
     speed of the reference and T its end. For a motion slowed by a factor k, this is the same integral with k
@@ -211,7 +211,7 @@ def _estimated(stop: StopWithRest) -> Modes:
 def _held_out(
     stops: Sequence[StopWithRest], count: int
 ) -> tuple[dict[StopWithRest, Modes], frozenset[StopWithRest]]:
-    """Return each stop's modes, found in the other half of the stops, and the stop itself if it is the only one."""
+    """Return modes for judging each stop, found in the other half of stops, and the stops judged by their own modes."""
     if len(stops) == 1:
         return {stops[0]: best_modes(stops, count)}, frozenset(stops)
     ordered = sorted(stops, key=lambda one: one.group)  # so that each half has its share of the repetitions
@@ -221,7 +221,7 @@ def _held_out(
 
 
 def best_modes(stops: Sequence[StopWithRest], count: int) -> Modes:
-    """Find the modes for which ZV shapers would leave least after some stops, in the order of frequency."""
+    """Find the modes with which ZV shapers would leave least vibration after stops, in the order of frequency."""
     # These modes suit shaping better than fitted ones: if an arm has more modes than a shaper, the best aim lies
     # between them.
     loudest = sorted(stops, key=lambda one: -one.unshaped.rms)[:ENOUGH]

@@ -14,9 +14,9 @@ from scipy.signal import lfilter
 from tvist_lab.metrics.ring_down import decay_rate
 from tvist_lab.recordings import Floats
 
-WAVES = 202.0  # waves of the error per turn of a joint [-]: of gears with a ratio of 101, as most of UR's
+WAVES = 202.0  # waves of the error per turn of a joint [-], for a gear ratio of 101, as in most UR joints
 WINDOW = (-0.6, 0.5)  # time around the stop in which the waves are fitted [s]
-BRAKING = 0.5  # weight of the time before the stop, when the arm accelerates itself [-]
+BRAKING = 0.5  # weight of samples before the stop, when the drives accelerate the arm [-]
 ERROR = 2e-5  # displacement of the tool by which gear errors may move it: 2e-5 rad at one metre [m]
 ALIKE = 15.0  # factor by which neighbouring samples of a residual count less [-]
 PHASES = (np.sin, np.cos)
@@ -45,7 +45,7 @@ def poles_of(modes: Sequence[tuple[float, float]]) -> Poles:
 
 
 def fitted(time: Floats, alpha: Floats, q: Floats, poles: Poles) -> Ripple | None:
-    """Fit the gears' part of a recorded stop, beside what the reference excites.
+    """Fit the vibration excited by gears in a recorded stop, together with that excited by the reference.
 
     `time` after the stop [s], evenly spaced, has shape (T,), `alpha` [m/s²] (T, 3), `q` [rad] (T, n). None if
     no mode or no turning joint is known.

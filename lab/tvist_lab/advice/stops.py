@@ -39,12 +39,12 @@ class ResidualVibration(NamedTuple):
     rms: float
     """rms of |α| from 20 ms after the stop, for up to 0.5 s, without the sensor's noise [m/s²]."""
     still: float
-    """Time from the unshaped stop until |α| stays below 0.1 m/s² or the noise [s]; infinite if not within the rest."""
+    """Time from the unshaped stop until |α| stays below 0.1 m/s² or the noise [s]; infinite if it never does."""
 
 
 @dataclass(frozen=True, eq=False)
 class StopWithRest:
-    """The end of a motion with the rest after it."""
+    """The end of a motion, with the time at rest after it."""
 
     file: int
     number: int
@@ -53,15 +53,15 @@ class StopWithRest:
     motion: MotionRows
     result: MotionResult
     time: Floats
-    """Times relative to the arm's stop, from the start of the motion, evenly spaced, shape (T,) [s]."""
+    """Evenly spaced times from the start of the motion on, relative to the arm's stop, shape (T,) [s]."""
     alpha: Floats
     """Acceleration of the tool below 60 Hz, shape (T, 3) [m/s²]."""
     q: Floats
-    """Joint angles of the reference, else the measured ones, shape (T, n) [rad]."""
+    """Joint angles of the reference or, if not recorded, the measured ones, shape (T, n) [rad]."""
     noise: float
     """Mean square of the sensor's noise, summed over the axes [m²/s⁴]."""
     group: int = field(default=0)
-    """Index of the motion of which this is a repetition."""
+    """Number that all repetitions of the same motion share."""
 
     @classmethod
     def of(cls, measured: MeasuredRecording, place: int, file: int = 0) -> "StopWithRest":
@@ -97,7 +97,7 @@ class StopWithRest:
 
     @property
     def rings(self) -> bool:
-        """Whether the vibration exceeds the noise and is worth a shaper."""
+        """Whether the vibration exceeds the noise and is large enough for a shaper."""
         return self.unshaped.rms > max(FELT, LOUD * math.sqrt(self.noise))
 
     @cached_property
@@ -153,7 +153,7 @@ def followed(recording: Recording) -> str:
 
 
 def _noise(tail: Floats, period: float) -> float:
-    """Return the mean square of the noise, summed over the axes [m²/s⁴]: without the modes if the tail still rings."""
+    """Return the mean square of the noise, summed over the axes [m²/s⁴]; vibration in the tail is subtracted."""
     rings = fit_ring_down(tail, period, modes=2, offset=True, skip=0.0, window=TAIL)
     return 3.0 * rings.rms**2 if rings.r_squared > RINGS else float(np.sum(np.var(tail, axis=0)))
 
@@ -163,7 +163,7 @@ def _at(times: Floats, time: Floats, values: Floats) -> Floats:
 
 
 def grouped(stops: Sequence[StopWithRest]) -> list[StopWithRest]:
-    """Number the stops by motion, and give them the smallest noise of each file's sensor."""
+    """Give repetitions of a motion the same `group`, and each stop the smallest noise found in its file."""
     firsts: list[StopWithRest] = []
     found = []
     for stop in stops:

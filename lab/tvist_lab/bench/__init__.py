@@ -1,1 +1,1 @@
-"""Speed of this machine: how many robots it runs, how late their ticks are, and how fast one is computed."""
+"""Speed of this machine: number of robots it can run, lateness of their ticks, and processor time of a tick."""

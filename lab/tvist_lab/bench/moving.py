@@ -96,7 +96,7 @@ def plant_tick() -> Run:
 
 
 def arm_tick(arm: SimulatedArm) -> Run:
-    """Measure a tick of an arm that makes the motion."""
+    """Measure a tick of an arm while it makes the motion from Q1 to Q3."""
     setup = free_setup(truth=False)
     dynamics = InverseDynamics(setup.description, body(setup.payload))
     commands = [DriveCommand(q, np.zeros_like(q), dynamics.gravity(q)) for q in motion()]
@@ -113,7 +113,7 @@ def arm_tick(arm: SimulatedArm) -> Run:
 
 
 def cycle_tick() -> Run:
-    """Measure a tick of Figure 6 with `zv`, without what surrounds it."""
+    """Measure a tick of the control cycle (Figure 6) with `zv`, without messages and encoding."""
     setup = free_setup(truth=False)
     payload, start, target = body(setup.payload), np.array(pose("Q1")), np.array(pose("Q3"))
     cycle = ControlCycle(

@@ -1,4 +1,4 @@
-"""Measure served robots: punctuality, response times and load of one, and how many one core runs."""
+"""Measure served robots: punctuality, response times and load of one robot, and how many one core can run."""
 
 import asyncio
 import os
@@ -30,7 +30,7 @@ COMMANDS = 200  # number of commands whose response time is measured
 NUMBERS = (1, 2, 4, 8, 12, 16, 20, 24, 28, 32, 40, 48, 64)  # numbers of robots to try, in order
 FAILURES = 2  # consecutive failures after which no larger numbers are tried
 TRIES = 2  # number of tries, of which the better counts, since other load only adds lateness
-MISSED = 0.001  # share of its ticks that each robot may miss [-]
+MISSED = 0.001  # share of ticks that each robot may miss [-]
 SETTLE = 2  # number of telemetry messages ignored at first, to exclude the start
 
 
@@ -166,7 +166,7 @@ def rss_mb(pid: int) -> float:
 
 
 async def robots_at_500_hz(seconds: float, tell: Callable[[str], None], options: Sequence[str] = ()) -> int:
-    """Return the largest number of robots in one process on one core of which none misses more than `MISSED`.
+    """Return the largest number of robots in one process on one core at which no robot misses more than `MISSED`.
 
     A client, on another core if there is one, reads every state. Each number is measured for `seconds`;
     `tell` receives a description before each measurement.
@@ -208,7 +208,7 @@ async def _worst_share(number: int, seconds: float, options: Sequence[str]) -> f
                 await enough.wait()
             await asyncio.to_thread(close_session, session)
     except (TimeoutError, ServedError):
-        return 1.0  # under too much load it does not even answer in time
+        return 1.0  # under too much load the server does not even answer in time
     return max(missed_share(told[SETTLE:]) for told in heard.values())
 
 

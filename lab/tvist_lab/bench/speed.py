@@ -22,7 +22,7 @@ LIBRARIES = ("tvist", "eclipse-zenoh", "mcap", "msgspec", "mujoco", "numba", "nu
 
 
 def speed(seconds: float, shaper: str, tell: Callable[[str], None]) -> dict[str, Any]:
-    """Measure for `seconds` each, or with 0 serve no robot; `tell` receives a description before each measurement."""
+    """Measure for `seconds` each; with 0, serve no robot. `tell` gets a description before each measurement."""
     result: dict[str, Any] = {
         "machine": this_machine(),
         "seconds": seconds,
@@ -49,7 +49,7 @@ def _usual(run: Run) -> float:
 
 
 def this_machine() -> dict[str, Any]:
-    """Describe this machine as it is now, on which figures depend."""
+    """Describe this machine in its present state, on which the measured figures depend."""
     return {
         "cpu": _processor(),
         "cores": processors(),  # number of cores available to this process

@@ -25,7 +25,7 @@ from tvist_lab.metrics.common_clock import STILL
 
 LARGE = 1.65  # factor on the usual size of text [-]: these figures are often viewed on a phone
 SHOWN = (-100.0, 1000.0)  # time shown before and after the stop [ms]
-NAMED = 4  # number of shapers on the front that are named besides the recommended one
+NAMED = 4  # number of shapers on the Pareto front that are named besides the recommended one
 MIN_DRAWN_PERCENT = 0.5  # lowest share that is drawn [%]
 OTHERS = np.linspace(0.01, 1.0, 30)  # durations of smoothing, as shares of the longest shaper's [-]
 
@@ -37,7 +37,7 @@ def advice_figures(advice: Advice) -> tuple[Figure, Figure]:
 
 
 def _worst_stop(advice: Advice) -> Figure:
-    """Draw |α| around the stop that rings most, as recorded and as predicted with the recommended shaper."""
+    """Draw |α| around the stop with most vibration, as recorded and as predicted with the recommended shaper."""
     assert advice.best is not None
     stop = max(advice.best.left, key=lambda one: one.unshaped.rms)
     impulses = impulses_of(advice.best.shaper, advice.best.aim.judged[stop])
@@ -56,7 +56,7 @@ def _worst_stop(advice: Advice) -> Figure:
 
 
 def _costs(advice: Advice) -> Figure:
-    """Draw what each shaper leaves against the time that it adds, medians over the stops that ring."""
+    """Draw each shaper's remaining vibration against its added time, as medians over stops with vibration."""
     figure, (panel,) = panels(1, 3.7)
     fair = [one for one in advice.options if one.keeps_limits]
     longest = max(one.added_s for one in fair)
@@ -85,7 +85,7 @@ def _costs(advice: Advice) -> Figure:
 
 
 def _place(option: Option) -> tuple[float, float]:
-    """Return the time that a shaper adds [ms], and what it leaves [%]."""
+    """Return the time that a shaper adds [ms], and the vibration that it leaves [%]."""
     return 1e3 * option.added_s, option.left_percent
 
 
@@ -94,7 +94,7 @@ def _short(option: Option) -> str:
 
 
 def _front(fair: list[Option], best: Option | None) -> list[Option]:
-    """Return some of the shapers that no shorter one beats, without the recommended one."""
+    """Return some shapers on the Pareto front (no shorter one leaves less), without the recommended one."""
     front, least = [], np.inf
     for one in sorted(fair, key=lambda one: (one.added_s, one.left_percent)):
         if one.left_percent < 0.8 * least:

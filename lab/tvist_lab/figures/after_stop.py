@@ -43,11 +43,11 @@ from tvist_lab.metrics.table import ring_down_of
 from tvist_lab.recordings import Floats, Recording
 
 SHOWN = (-50.0, 350.0)  # time shown before and after the end of the unshaped motion's reference [ms]
-HEADROOM = 1.6  # height of the axis over the larger peak, to show the end of braking [-]
+HEADROOM = 1.6  # height of the axis relative to the larger peak, to show the end of braking [-]
 WORDS_AT = 100.0  # time at which the names of the curves start [ms]
 BEFORE, AFTER = 100.0, 600.0  # time shown before and after the stop of the first of several curves [ms]
 BEFORE_S, AFTER_S = 0.1, 0.7  # time shown before and after the stop [s]
-BLOCK = 0.2  # duration of the data of one spectrum of the spectrogram [s]; faster changes are smeared over it
+BLOCK = 0.2  # duration of the data for one spectrum of the spectrogram [s]; faster changes are blurred
 HIGHEST = 45.0  # largest frequency shown [Hz]
 RANGE = 40.0  # levels shown below the largest one [dB]
 LINES = 4096  # number of samples to which the ring-down is padded for its spectrum
@@ -122,10 +122,10 @@ class ComparedPanel(NamedTuple):
 
 
 def compared_figure(motions: Sequence[ComparedPanel], unshaped: Sequence[str] = ()) -> Figure:
-    """Draw |α| of several motions, one panel each, on one scale; time 0 is the start of the motion.
+    """Draw |α| of several motions, one panel each, on one scale; time 0 is the stop of a panel's first curve.
 
-    Motions that cannot be drawn are left out; of more than eight curve names, the rest is. Curves named in
-    `unshaped` have the colour of unshaped motions. Raises NotMeasurableError if no motion can be drawn.
+    Motions that cannot be drawn, and curve names beyond the eighth, are left out. If one curve is named in
+    `unshaped`, it has the colour of unshaped motions. Raises NotMeasurableError if no motion can be drawn.
     """
     drawn = [(one, curves) for one in motions if (curves := _around_stop(one.curves))]
     if not drawn:
@@ -159,7 +159,7 @@ def compared_figure(motions: Sequence[ComparedPanel], unshaped: Sequence[str] = 
 
 
 def _around_stop(recorded: Mapping[str, Recorded]) -> dict[str, tuple[Floats, Floats, float]]:
-    """Return time after the first curve's stop [s], |α|, and its peak from 10 ms after the curve's own stop [m/s²]."""
+    """Return of each curve time after the first one's stop [s], |α|, and its peak after its own stop [m/s²]."""
     curves = {}
     (first, motion), *_ = recorded.values()
     stop = float(first.time[motion.arm_stop(first)] - first.time[motion.start])

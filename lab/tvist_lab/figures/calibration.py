@@ -38,7 +38,7 @@ LEVELS = 9  # largest number of levels of a map
 
 
 def move_plan_figure(plan: JogPlan) -> Figure:
-    """Draw the arm from the side and from above: at present, in every posture on the way, and where it rings."""
+    """Draw the arm from the side and from above: at present, in postures on the way, and where jogs end."""
     model = rigid_model(plan.arm.description, body(plan.arm.payloads[0]))
     data = model.createData()
 
@@ -69,7 +69,7 @@ def move_plan_figure(plan: JogPlan) -> Figure:
 
 
 def identified_figure(name: str, measured: Floats, fitted: Floats) -> Figure:
-    """Draw the lowest mode of each ring-down: fitted without it against measured in it alone.
+    """Draw the lowest mode at each ring-down: fitted to the other ring-downs against fitted to this one alone.
 
     `measured` and `fitted` hold f_d [Hz] and ζ [-], shape (2, N); `name` is the calibration's.
     """
@@ -87,8 +87,7 @@ def identified_figure(name: str, measured: Floats, fitted: Floats) -> Figure:
 
 def workspace_map_figure(found: WorkspaceMap, key: str, words: str) -> Figure:
     """Draw maps of "f_d_hz" or "zeta": identified, true, and the error; `words` complete the heading."""
-    # White areas are left out because the arm would touch itself or the floor there. In a narrow figure the
-    # maps are stacked.
+    # Areas where the arm would touch itself or the floor are white. In a narrow figure the maps are stacked.
     symbol, meaning, unit = LABELS[key]
     if beside := rcParams["figure.figsize"][0] > NARROW:
         figure, axes = panels(1, 3.0, columns=3, share_x=False, share_y=True)

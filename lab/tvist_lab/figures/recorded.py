@@ -134,7 +134,7 @@ def _name_joints(panel: Axes, recording: Recording, motion: MotionRows) -> None:
 
 
 def _alike(qdd: Floats) -> list[tuple[Floats, list[int]]]:
-    """Return the distinct accelerations, shape (T,) [rad/s²], each with its joints."""
+    """Return the distinct accelerations, shape (T,) [rad/s²], each with the joints that share it."""
     near = 0.02 * float(np.max(np.abs(qdd)))
     groups: list[tuple[Floats, list[int]]] = []
     for joint, values in enumerate(qdd.T):
@@ -231,7 +231,7 @@ def figure_16(motions: Mapping[str, tuple[Recorded, Recorded]]) -> Figure:
 
 
 def _draw(panel: Axes, recorded: Recorded, style: Series, label: str) -> tuple[Residual, str]:
-    """Draw one recording; return its residual vibration, and the method if it was not a drawn decay."""
+    """Draw one recording; return its residual vibration, and a remark unless that is the start of the drawn decay."""
     recording, motion = recorded
     start, rv = recording.time[motion.start], residual(recording, motion)
     alpha = amplitude(tool_acceleration(recording))

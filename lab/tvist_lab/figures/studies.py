@@ -33,7 +33,7 @@ EACH = 0.22
 """Height for each setting of a sweep [inch]."""
 LONG_NAME = 16  # length from which a name takes two lines [letters]
 FLOOR = 1e-4  # smaller peaks are drawn at this value [m/s²]
-NOTICEABLE = 1.01  # peak over limit that still counts as keeping it, due to a filter's ripple [-]
+NOTICEABLE = 1.01  # largest ratio of peak to limit that counts as within, due to a filter's ripple [-]
 
 
 def study_figure(
@@ -122,7 +122,7 @@ def sweep_figure(entries: Sequence[dict[str, Any]], settings: Sequence[str]) -> 
 def robustness_figure(
     cells: Mapping[str, Sequence[dict[str, Any]]], errors: Mapping[str, Sequence[float]]
 ) -> Figure:
-    """Draw the reduction by shaper, median with a bar to the 5th percentile, the worse of ± each error.
+    """Draw each shaper's reduction for each size of error: median with a bar to the 5th percentile, worse sign.
 
     `cells` are entries by kind of error, ordered by delay; see `tvist_lab.studies.robustness`.
     """
@@ -262,7 +262,7 @@ def settling_figure(rows: Sequence[dict[str, Any]]) -> Figure:
 
 
 def _slowest(row: dict[str, Any]) -> float:
-    """Return the 90th percentile of the settling time [ms], or the median if over a tenth never settle."""
+    """Return the 90th percentile of the settling time [ms]; if over a tenth never settle, the median."""
     slow = row["time_until_still_ms_p90"]
     return float(row["time_until_still_ms_median"] if slow is None else slow)
 
@@ -273,7 +273,7 @@ def _point(row: dict[str, Any]) -> tuple[float, float]:
 
 
 def _beside(place: int, point: tuple[float, float], points: Sequence[tuple[float, float]]) -> bool:
-    """Return whether a name goes on the right: away from a neighbour of similar height, else alternately."""
+    """Whether to write a name on the right of its point: away from a close neighbour, otherwise alternately."""
     x, y = point
     away = [other - x for other, height in points if abs(math.log(y / height)) < 0.12]
     if any(0.0 < other < 45.0 for other in away):

@@ -51,7 +51,7 @@ _Entry = tuple[int, str, Schema | None, Any]  # time [ns], topic, schema, and me
 
 @dataclass(frozen=True)
 class FoxgloveArm:
-    """An arm of n joints; a link's frame is at its far end, the last one is the flange."""
+    """An arm of n joints; the frame of a link is at the link's far end, the last frame is the flange."""
 
     frames: tuple[str, ...]  # names of the frames: the base, and one for each link
     turns: Rotation  # rotation of each link's frame relative to its joint at angle 0, n of them
@@ -237,8 +237,8 @@ def _entity(arm: FoxgloveArm, body: Body) -> dict[str, Any]:
 
 
 def _stood(content: RecordingFile, arm: FoxgloveArm) -> tuple[tuple[Floats, Floats, Floats], list[str]]:
-    """Return ticks, joint angles and bends of the first row in each ten ticks, and notes on what is missing."""
-    # Values are true if the truth was recorded, else measured, without bending.
+    """Return ticks, joint angles and bends of one row for every ten ticks, and notes on what is missing."""
+    # Take the truth if it was recorded, otherwise the measured angles without bending.
     recording = content.recording
     rows = np.flatnonzero(np.diff(recording["tick"] // PICTURE_TICKS, prepend=-1.0))
     ticks, q = recording["tick"][rows], recording["actual_q"][rows]
@@ -280,7 +280,7 @@ def _transforms(
 
 
 def _curves(recording: Recording) -> tuple[Iterator[tuple[int, dict[str, float]]], list[str]]:
-    """Return |α| [m/s²] and the largest joint acceleration around the shaper [rad/s²] at every tick, and notes."""
+    """Return |α| [m/s²], the largest joint acceleration before and after the shaper [rad/s²] by tick, and notes."""
     before, after = (np.abs(recording[f"{name}_qdd"]).max(axis=1) for name in ("unshaped", "target"))
     found, notes = {"after_shaper": after}, []
     if np.any(recording["shaper_delay"] > 0.0) and np.any(after) and np.array_equal(before, after):

@@ -1,4 +1,4 @@
-"""Fit a calibration to ring-downs: springs and drives, polynomials where covered, and the accuracy of both."""
+"""Fit a calibration to ring-downs: springs and drives, polynomials if the workspace is covered, and accuracies."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -73,7 +73,7 @@ class Found:
 
     calibration: Calibration
     stops: tuple[RingDownStop, ...]
-    """All stops; those that were not used have a reason, also if they contradict others."""
+    """All stops; those that were not used have a reason, for example that they contradict others."""
     left: tuple[LeftOut, ...]  # the fitted ring-downs, with their modes from fits without them
     forecast: ModeForecast
     known_percent: float
@@ -89,12 +89,12 @@ class Found:
 
     @property
     def modes(self) -> int:
-        """Number of reported modes: at most `REPORTED_MODES`, fewer where fewer vibrate."""
+        """Number of reported modes: `REPORTED_MODES`, or fewer if fewer were found in ring-downs."""
         return min(REPORTED_MODES, *(len(one.f_d) for one in self.left))
 
     @property
     def lowest_mode(self) -> tuple[Floats, Floats]:
-        """f_d [Hz] and ζ [-] in each ring-down that determines them, and from fits without it, shapes (2, N)."""
+        """f_d [Hz] and ζ [-] of ring-downs that determine them, and from fits without each, shapes (2, N)."""
         sure = [one for one in self.left if 0 in one.own.certain]
         return (
             np.array([(one.own.f_d[0], one.own.zeta[0]) for one in sure]).reshape(-1, 2).T,
@@ -192,7 +192,7 @@ def agreeing(
     description: RobotDescription, logs: Sequence[Log], progress: Progress
 ) -> tuple[list[RingDownStop], ArmModes, list[Ringing]]:
     """Return all stops, the arm with their payloads, and at most `MAX_RING_DOWNS` ring-downs that agree."""
-    # The ring-downs have the gear hysteresis that explains all of them best.
+    # Set in the ring-downs the gear hysteresis that explains all of them best.
     check_logs(description, logs)
     progress("looking for stops")
     stops, payloads = stops_of(logs)
@@ -231,7 +231,7 @@ def check_logs(description: RobotDescription, logs: Sequence[Log]) -> None:
 
 
 def more_jogs(forecast: ModeForecast, last: Ringing) -> tuple[Jog, ...]:
-    """Propose jogs that would add most information, starting from where the last ring-down was recorded."""
+    """Propose jogs that would add most information; the first way starts where the last ring-down was recorded."""
     arm = forecast.arm
     counts = [PROPOSED if number == last.payload else 0 for number in range(len(arm.payloads))]
     candidates = free_configurations(arm.description, (arm.payloads[last.payload],), CANDIDATES, 0)
@@ -241,7 +241,7 @@ def more_jogs(forecast: ModeForecast, last: Ringing) -> tuple[Jog, ...]:
 def _with_polynomials(
     calibration: Calibration, arm: ArmModes, ringings: Sequence[Ringing], springs: ModalFit
 ) -> tuple[Calibration, str]:
-    """Add polynomials for the payload with most ring-downs if they are accurate; else return why not."""
+    """Add polynomials for the payload with most ring-downs; if they cannot be fitted well, return the reason."""
     counted = Counter(r.payload for r in ringings)
     payload = max(counted, key=lambda number: (counted[number], arm.payloads[number].mass))
     try:
@@ -254,7 +254,7 @@ def _with_polynomials(
 
 
 def _errors(left: Sequence[LeftOut]) -> list[ModeErrors | None]:
-    """Return the errors of each mode at configurations whose ring-down is accurate enough."""
+    """Return the errors of each mode, from ring-downs that determine the mode accurately enough."""
     errors: list[ModeErrors | None] = []
     for k in range(REPORTED_MODES):
         sure = [

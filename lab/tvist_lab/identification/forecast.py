@@ -21,11 +21,11 @@ from tvist_lab.recordings import Floats
 DIFFERENCE_STEP = 1e-3  # step of a logarithm for finite differences [-]
 MIN_ERRORS = (0.015, 0.06)
 """Smallest assumed errors of f_d and ζ [-]: joints that share a parameter differ; friction and gears are nonlinear."""
-FEWEST = 6  # number of modes in left-out ring-downs needed to check the intervals
-CONTRADICTION = 0.2  # share explained only by its own poles that contradicts the others [-]
+FEWEST = 6  # smallest number of modes in left-out ring-downs with which intervals can be checked
+CONTRADICTION = 0.2  # `OwnPoles.share` of a ring-down from which it contradicts the others [-]
 SIGNIFICANT = 60.0  # least `OwnPoles.significance` of a contradiction [-]
-SUSPECTS = 3  # number of ring-downs that are left out in turn
-GUILTY = 3  # if more than one in this number is wrong, the wrong ring-downs cannot be determined
+SUSPECTS = 3  # number of the worst explained ring-downs, of which each is left out in turn
+GUILTY = 3  # if more than one ring-down in this number is wrong, the wrong ones cannot be determined
 SINGLY = 14  # largest number of configurations that are left out one by one
 FOLDS = 10  # number of parts into which more configurations are divided
 
@@ -68,8 +68,8 @@ class ModeForecast:
 
     def at(self, q: Floats, payload: int, modes: int = 1) -> ForecastModes:
         """Return the lowest modes at a configuration with one of the payloads."""
-        # An error of the masses shifts the modes, but it also shifted the fitted parameters, which mostly
-        # compensates.
+        # An error of the masses shifts the modes, but it also shifted the fitted parameters; both effects mostly
+        # cancel.
         arm, here, mass = self.arm, self.fit.logarithms, self.arm.mass(q, payload)
 
         def logarithms(parameters: Floats, mass: Floats) -> Floats:
@@ -85,7 +85,7 @@ class ModeForecast:
         return ForecastModes(*np.exp(found), *errors)
 
     def widened(self, left: Sequence[LeftOut]) -> "ModeForecast":
-        """Return a forecast whose errors are at least as large as those found at ring-downs left out of fits."""
+        """Return a forecast with errors enlarged, if necessary, to those found at ring-downs left out of fits."""
         squares: list[tuple[float, float]] = []
         for one in left:
             known = self.at(one.ringing.q, one.ringing.payload, MODES)
@@ -106,8 +106,8 @@ class ModeForecast:
 
 def contradicting(arm: ArmModes, ringings: Sequence[Ringing]) -> list[int]:
     """Find ring-downs that no springs and drives can explain together with the others."""
-    # A wrong ring-down also spoils the fit of the others. Among the worst explained ones, the one whose
-    # omission gives the best fit is therefore left out, until the rest agree.
+    # A wrong ring-down also spoils the fit of the others. So leave out each of the worst explained ones in turn,
+    # remove the one without which the fit is best, and repeat until the rest agree.
     fit = fit_modal(arm, ringings)
     rest = list(range(len(ringings)))
     guilty: list[int] = []
@@ -131,7 +131,7 @@ def contradicting(arm: ArmModes, ringings: Sequence[Ringing]) -> list[int]:
 
 
 def cross_validate(arm: ArmModes, ringings: Sequence[Ringing], fit: ModalFit) -> tuple[list[LeftOut], Floats]:
-    """Fit without each configuration in turn, or without each of `FOLDS` parts of many configurations.
+    """Fit without each configuration in turn; if there are many, without each of `FOLDS` parts of them.
 
     Also return the jackknife covariance of the parameters' logarithms, shape (P, P), which includes model
     errors as well as noise.

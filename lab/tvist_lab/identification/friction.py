@@ -1,7 +1,7 @@
 """Identify each joint's friction from speed and torque in a slow motion there and back.
 
-The way back is the way there reversed in time. Weight and inertia need the same torque on both, friction the
-opposite one; half the difference is friction alone, whatever the masses:
+The way back is the way there reversed in time. Weight and inertia need the same torque on both ways, friction
+needs opposite torques. So half the difference of the torques is friction alone, whatever the masses:
 
     (τ_there(t) - τ_back(T - t)) / 2 = F(v),  F(v) = [F_c + (F_s - F_c) exp(-(v/v_s)²)] tanh(v/w) + F_v v
 
@@ -32,7 +32,7 @@ LIMITS = MotionLimits(velocity=0.3, acceleration=0.2, jerk=100.0)
 REST = 0.3  # rest before the way there and back [s]
 PLACES = 8  # number of configurations tried for a free way
 BLOCK = 10  # number of ticks over which speeds and torques are averaged
-SETTLING = 2  # number of blocks left out at both ends, where friction still holds the earlier state
+SETTLING = 2  # number of blocks left out at both ends, where friction still depends on the earlier motion
 GROWTH = (0, 1, 4)  # powers of the speed with which the noise grows, since the gears' ripple grows with speed
 LEAST_NOISE = 0.003  # smallest assumed noise, relative to the joint's friction [-]
 ROUNDS = 4  # number of fits, each weighted with the residuals of the one before
@@ -66,7 +66,7 @@ async def identify_friction(
 
 
 async def _sweep(robot: Robot, control: Arm, places: Sequence[Floats]) -> Recording:
-    """Record the way there and back around the first place where it is free."""
+    """Record the way there and back around the first of `places` where the way is free of collision."""
     period = 1.0 / (await robot.info()).rate_hz
     for middle in places[:PLACES]:
         for side in (0.5 * LENGTH, -0.5 * LENGTH):
@@ -86,7 +86,7 @@ async def _sweep(robot: Robot, control: Arm, places: Sequence[Floats]) -> Record
 
 
 def there_and_back(recording: Recording) -> tuple[Floats, Floats]:
-    """Return speeds [rad/s] and friction torques [N m] there and back, block means of shape (k, n)."""
+    """Return speeds [rad/s] and friction torques [N m], from both ways, as block means of shape (k, n)."""
     there, back = motions(recording)[-2:]
     length = min(there.shaped_stop - there.start, back.shaped_stop - back.start)
 
@@ -110,8 +110,8 @@ def friction(logarithms: Floats, speed: Floats) -> Floats:
 
 def fit_friction(unknown: Sequence[Unknown], speed: Floats, torque: Floats) -> tuple[ModalParameter, ...]:
     """Fit the friction of one joint to speeds [rad/s] and torques [N m] of shape (k,)."""
-    # Ripple of the gears makes noise that grows with speed, so each block has its own weight; it is
-    # correlated from block to block, which widens the intervals.
+    # Ripple of the gears makes noise that grows with speed, so each block has its own weight. This noise is
+    # correlated from block to block, so the intervals are widened.
     guess = np.log([one.guess for one in unknown])
     deviation = np.array([one.deviation for one in unknown])
     low = np.full(len(guess), -np.inf)

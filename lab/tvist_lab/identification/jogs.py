@@ -1,8 +1,8 @@
 """Plan and make jogs: choose the most informative ones, find free ways to them, and record their ring-downs.
 
 A robot that takes only positions follows with a servo's lag, so its set-points still move when the reference
-has stopped. A turn of the last joint, which hardly bends, is recorded first to find that lag; the fit of the
-ring-downs then includes it with known poles.
+has stopped. To find that lag, a turn of the last joint, which hardly bends, is recorded first. The fit of the
+ring-downs then includes the lag as known poles.
 """
 
 import asyncio
@@ -49,31 +49,31 @@ from tvist_protocol.values import Payload
 
 RING_DOWNS = 12
 MIN_RING_DOWNS = 4  # smallest useful number of ring-downs; with fewer, the model would be mostly guesses
-MAX_CHOSEN = 37  # most ring-downs chosen for their information; more are spread
+MAX_CHOSEN = 37  # most ring-downs that are chosen for their information; if more are wanted, all are spread
 CANDIDATES = 60  # smallest number of configurations to choose from
-CANDIDATES_PER_JOG = 3  # number of candidates for each jog, since the way to some is not free
+CANDIDATES_PER_JOG = 3  # number of candidates for each jog, since ways to some of them may collide
 CHECK_STEP = 0.03  # step of the fastest joint between postures at which a way is checked [rad]
-GENTLEST = 0.4  # smallest quickness of a jog relative to the quickest [-]
-FIRST = 0.55  # quickness of the first jog relative to what its torques permit [-]
+GENTLEST = 0.4  # smallest speed of a jog relative to that with `LIMITS` [-]
+FIRST = 0.55  # speed of the first jog relative to the largest that the torque limits permit [-]
 LOUD, LATER = 0.15, 0.1
-"""Rms acceleration per axis to aim at, as after a program's motion [m/s²], and the time after the stop [s]."""
+"""Desired rms acceleration per axis, as after a program's motion [m/s²], and its time after the stop [s]."""
 INEXACT, STICKING = 0.03, 0.2  # share of a ring-down that no model explains [-], normally and if motors stick
-STICKS = 1.5  # ratio of friction at breakaway to that in motion from which a motor sticks [-]
+STICKS = 1.5  # ratio of breakaway to moving friction above which a motor counts as sticking [-]
 WAYS = MotionLimits(velocity=1.5, acceleration=2.0, jerk=100.0)  # limits of the ways to the jogs
 GENTLE = 1.0  # acceleration on the ways of a robot that takes only positions [rad/s²]
-TURN, TURNS = 0.1, 2  # angle of the last joint's turns to find the lag [rad], their number
+TURN, TURNS = 0.1, 2  # angle of the turns of the last joint that find the lag [rad], and their number
 UNKNOWN = 0.15  # time after the stop that is ignored if the lag is unknown [s]
 PAUSE, AFTER = 0.3, 0.6  # rest before a jog, and time recorded after it [s]
 
 
 @dataclass(frozen=True)
 class Jog:
-    """A short move after which the arm rings, and free ways to its start."""
+    """A short move that excites a ring-down, and a way to its start that is free of collision."""
 
     payload: int
     way: tuple[Floats, ...]
     """Postures to pass one after the other, ending at the jog's start, each of shape (n,) [rad]."""
-    q: Floats  # end of the jog, where the arm rings, shape (n,) [rad]
+    q: Floats  # end of the jog, where the arm vibrates, shape (n,) [rad]
     limits: MotionLimits
 
 
@@ -177,7 +177,7 @@ def plan_ways(
     counts: Sequence[int],
     known: tuple[Floats, Floats] | None = None,
 ) -> list[Jog]:
-    """Choose the most informative jogs for each payload and find ways to them; fewer if ways are not free.
+    """Choose the most informative jogs for each payload and find ways to them; leave out jogs without a free way.
 
     `known` holds the logarithms of the parameters and their covariance; None means the guess.
     """
@@ -205,15 +205,15 @@ def plan_ways(
 
 
 def slower(limits: MotionLimits, quickness: float) -> MotionLimits:
-    """Return the limits of a motion that takes longer by 1 / quickness."""
+    """Return the limits with which a motion takes 1 / quickness times as long."""
     return MotionLimits(
         quickness * limits.velocity, quickness**2 * limits.acceleration, quickness**3 * limits.jerk
     )
 
 
 def _quickness(dynamics: InverseDynamics, start: Floats, end: Floats, torque: Floats) -> float:
-    """Return the largest quickness of a jog, up to 1, at which the arm rings within its torque limits."""
-    # A saturated drive would spoil the ring-down.
+    """Return the largest `quickness` of a jog, up to 1, with which jog and ring-down keep the torque limits."""
+    # If a drive saturated, the ring-down would not be free vibration.
     room = acceleration_on_way(dynamics, JointLine(start, end), start, end - start, LIMITS.velocity, torque)
     return min(1.0, float(np.sqrt(room / (1.0 + REBOUND) / LIMITS.acceleration)))
 
@@ -230,9 +230,9 @@ def is_free(collisions: CollisionModel, *postures: Floats) -> bool:
 
 
 async def make_jogs(robot: Robot, control: Arm, plan: JogPlan, progress: Progress) -> RingDownLogs:
-    """Sweep slowly for friction, and make the jogs, each just strong enough for a clear ring-down."""
-    # A robot that takes only positions turns its last joint instead, to find its lag; its torques are
-    # unknown.
+    """Measure friction in a slow motion, then make the jogs, each just strong enough for a clear ring-down."""
+    # If the robot takes only positions, its torques are unknown: instead of the slow motion, turn its last
+    # joint to find its lag.
     info, began = await robot.info(), (await robot.state()).tick
     await control.set_shaper("none")
     found = RingDownLogs((), seed=plan.seed)
@@ -248,7 +248,7 @@ async def make_jogs(robot: Robot, control: Arm, plan: JogPlan, progress: Progres
             try:
                 friction = await identify_friction(robot, control, plan.arm.description, places)
                 found = replace(found, friction=friction, no_friction="")
-            except IdentificationError as error:  # springs can be measured all the same
+            except IdentificationError as error:  # springs can be measured without the friction
                 found = replace(found, no_friction=str(error))
         logs = await _jogs(robot, control, plan, info, found, progress)
     finally:

@@ -33,15 +33,15 @@ Complex = npt.NDArray[np.complex128]
 
 MODES = 4  # number of modes in a ring-down; a robot arm's higher modes decay within a few ticks
 RAYLEIGH = 2.0 / (3.0 * np.pi) + 0.5j
-"""Change of damping ratio (real) and frequency (imaginary) per share by which hysteresis softens [-]."""
+"""Change of damping ratio (real) and frequency (imaginary) per relative loss of stiffness by hysteresis [-]."""
 SMOOTHED = 0.03  # width of the window in which the amplitude is determined [s]
 DIFFERENCE_STEP = 1e-4  # step of a logarithm for finite differences [-]
 INSIDE = 1e-3  # distance of a starting point from the bounds of the search [-]
 EVALUATIONS = 60
 SOFTENINGS = (0.0, 50.0, 100.0, 200.0, 300.0)
 """Softening by hysteresis to try [1/m]: 200 is 3 % for an amplitude of 1 m/s² at 13 Hz."""
-LOOSE = 0.5  # deviation of the logarithms of own f_d and ζ from their starting values [-]
-CERTAIN = (0.05, 0.2)  # largest errors of own f_d and ζ with which a ring-down can judge a model
+LOOSE = 0.5  # prior deviation of the logarithms of a ring-down's own f_d and ζ from their start [-]
+CERTAIN = (0.05, 0.2)  # largest errors of f_d and ζ fitted to a ring-down alone that may judge a model [-]
 STARTS = 4  # number of starting points of the search; the first one is the guess
 SPREAD = 0.35  # standard deviation of the other starting points about the guess [-]
 
@@ -63,7 +63,7 @@ class ModalFit:
 
 
 class _Signal:
-    """One ring-down, its mass matrix, and the projection that eliminates the amplitudes."""
+    """One ring-down with its mass matrix; amplitudes are eliminated by projection."""
 
     def __init__(self, arm: ArmModes, ringing: Ringing) -> None:
         self.mass, self.force = arm.mass(ringing.q, ringing.payload), ringing.force
@@ -145,7 +145,7 @@ def fit_modal(arm: ArmModes, ringings: Sequence[Ringing], start: Floats | None =
         max_nfev=EVALUATIONS,
     )
     samples = sum(signal.force.size for signal in signals)
-    # The model error is not white noise, but its size is the only known estimate.
+    # The model error is not white noise, but the residual's size is the only estimate of it.
     excess = max(float(np.mean(found.fun[:samples] ** 2)), 1.0)
     changes = found.jac[:samples]
     knowledge = changes.T @ changes / excess + np.diag(arm.deviation**-2)
@@ -161,8 +161,8 @@ def fit_modal(arm: ArmModes, ringings: Sequence[Ringing], start: Floats | None =
 
 def fit_from_many(arm: ArmModes, ringings: Sequence[Ringing]) -> ModalFit:
     """Return the best fit from several starting points."""
-    # Parameters can compensate each other, so several sets may explain the ring-downs equally well. All of
-    # them add to the deviations, weighted by likelihood: a parameter in which they differ is uncertain.
+    # Parameters can compensate each other, so several sets may explain the ring-downs equally well. A parameter
+    # that differs between such sets is uncertain: their spread, weighted by likelihood, adds to the deviations.
     rng = np.random.default_rng(0)
     starts = [arm.guess, *(arm.guess + rng.normal(0.0, SPREAD, (STARTS - 1, len(arm.guess))))]
     fits = [fit_modal(arm, ringings, start) for start in starts]
@@ -173,14 +173,14 @@ def fit_from_many(arm: ArmModes, ringings: Sequence[Ringing]) -> ModalFit:
 
 
 def softened(arm: ArmModes, ringings: Sequence[Ringing]) -> list[Ringing]:
-    """Return ring-downs with the gear hysteresis that explains all of them best."""
+    """Return the ring-downs with `softening` set to the hysteresis that explains all of them best."""
     fits = {share: fit_modal(arm, [replace(r, softening=share) for r in ringings]) for share in SOFTENINGS}
     best = min(fits, key=lambda share: fits[share].cost + 0.5 * (share / SOFTENINGS[-1]) ** 2)
     return [replace(r, softening=best) for r in ringings]
 
 
 def of_masses(arm: ArmModes, ringings: Sequence[Ringing], fit: ModalFit) -> Floats:
-    """Return the shift of the parameters' logarithms by the deviation of each mass, shape (P, masses)."""
+    """Return the shift of the fitted logarithms if each mass deviates as assumed, shape (P, masses)."""
     # Masses are not fitted, since they are known better than a fit could find them. The shift is of first
     # order.
     signals = [_Signal(arm, r) for r in ringings]
@@ -196,14 +196,14 @@ def of_masses(arm: ArmModes, ringings: Sequence[Ringing], fit: ModalFit) -> Floa
 
 
 def information(arm: ArmModes, ringing: Ringing, logarithms: Floats) -> Floats:
-    """Return the information of a ring-down about the parameters: their inverse covariance, shape (P, P)."""
+    """Return a ring-down's information about the parameters: the inverse of their covariance, shape (P, P)."""
     change = _Signal(arm, ringing).slopes(arm, logarithms)
     return np.asarray(change.T @ change)
 
 
 @dataclass(frozen=True)
 class OwnPoles:
-    """Modes of one ring-down with their accuracy, and how much worse other poles explain it."""
+    """Modes fitted to one ring-down alone, their accuracy, and how much worse given poles explain the ring-down."""
 
     f_d: Floats  # damped frequencies, shape (k,) [Hz]
     zeta: Floats  # damping ratios, shape (k,) [-]
@@ -211,8 +211,8 @@ class OwnPoles:
     zeta_error: Floats  # standard deviation of the logarithm of ζ, shape (k,) [-]
     amplitude: Floats  # largest initial |α| of each mode, shape (k,) [m/s²]
     significance: float
-    """Increase of the residual's sum of squares with the other poles, over the noise's variance [-]; 8 by chance."""
-    share: float  # rms that only these poles explain, relative to the vibration [-]
+    """Increase of the residual's sum of squares with the given poles, over the noise's variance [-]; 8 by chance."""
+    share: float  # rms that these poles explain but the given ones do not, relative to the vibration [-]
 
     @property
     def certain(self) -> list[int]:
@@ -222,7 +222,7 @@ class OwnPoles:
 
 
 def own_poles(arm: ArmModes, ringing: Ringing, poles: Complex) -> OwnPoles:
-    """Fit poles to one ring-down, starting near others, independent of springs and drives."""
+    """Fit poles to one ring-down alone, starting from given poles; springs and drives do not constrain them."""
     signal = _Signal(arm, ringing)
     f_d, zeta = describe(poles)
     start = np.log(np.concatenate([f_d, np.clip(zeta, 1e-4, 0.95)]))
@@ -249,7 +249,7 @@ def own_poles(arm: ArmModes, ringing: Ringing, poles: Complex) -> OwnPoles:
 
 
 def own_poles_near(arm: ArmModes, ringing: Ringing, fit: ModalFit) -> OwnPoles:
-    """Fit a ring-down's own poles, starting from those of a fit."""
+    """Fit poles to one ring-down alone, starting from those of fitted springs and drives."""
     return own_poles(arm, ringing, lowest_poles(fit.drivetrain, arm.mass(ringing.q, ringing.payload)))
 
 

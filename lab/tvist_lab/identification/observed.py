@@ -1,4 +1,4 @@
-"""Motions of logs for a twin to repeat, and the twin's response to them."""
+"""Recorded motions that a twin repeats in simulation, and its response."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -33,9 +33,9 @@ class Observed:
     log: str
     motion: int
     payload: int
-    start: Floats  # joint angles at rest before it, shape (n,) [rad]
+    start: Floats  # joint angles at rest before the motion, shape (n,) [rad]
     reference: Floats  # reference, shape (T, n) [rad]
-    late: int  # ticks by which another controller's arm follows later than a twin
+    late: int  # ticks by which an arm of another controller lags behind a twin
     felt: tuple[Floats, Floats, float]
     """Ticks (k,) and specific force (k, 3) near the stop, and the force's inaccuracy [m/s²]."""
     residual: slice  # rows of `felt` in which the vibration counts as residual
@@ -43,7 +43,7 @@ class Observed:
     angles: tuple[Floats, Floats]
     """Ticks (m,) and measured angles, block means (m, n) [rad]; empty if not recorded."""
     torques: tuple[Floats, Floats]
-    """Ticks and measured torques likewise [N m], up to the stop: at rest, friction hides the torque."""
+    """Ticks (m,) and measured torques (m, n) [N m], up to the stop: at rest, friction hides the torque."""
     foreign: bool  # whether another controller moved the arm
 
     @property
@@ -63,7 +63,7 @@ class Observed:
 
 
 def observe(logs: Sequence[Log], payloads: Sequence[Payload]) -> tuple[list[Observed], list[RingDownStop]]:
-    """Return the motions that a twin can repeat, and the others with the reason."""
+    """Return the motions that a twin can repeat, and the other motions with the reason why it cannot."""
     found, others = [], []
     for log in logs:
         if "target_q" not in log.recording:
@@ -150,7 +150,7 @@ def mounting_of(pairs: Sequence[tuple[Floats, Floats]]) -> Floats:
 
 
 def apart(response: Response, motion: Observed, mounting: Floats, torque: Floats) -> Floats:
-    """Return the twin's motion minus the measured one, each part over its inaccuracy, flattened."""
+    """Return the twin's forces, angles and torques minus the measured ones, over their inaccuracies, flattened."""
     _, force, inaccuracy = motion.felt
     parts = [((felt_by(response, motion, mounting) - force) / inaccuracy).ravel()]
     own = (response.measured.q, np.full(len(torque), ANGLE)), (response.measured.moment, TORQUE * torque)
@@ -162,7 +162,7 @@ def apart(response: Response, motion: Observed, mounting: Floats, torque: Floats
             difference = middle - values
             if (
                 values is motion.angles[1]
-            ):  # friction holds the arm where its past says, and angles may not sag
+            ):  # friction may hold the arm off by an unknown angle, and logs may not contain the sag
                 difference -= difference[0].copy()
             parts.append((difference / scale).ravel())
     return np.concatenate(parts)

@@ -40,8 +40,8 @@ MIN_POSES = 3
 LEAST_ERROR = 0.01  # smallest assumed error of a torque, relative to the joint's friction [-]
 ROTOR = 3.0  # largest assumed inertia of a rotor [kg m^2]
 DISAGREEMENT = (0.3, 4.0)
-"""Masses at rest and in motion that differ by more than this [kg] and these standard deviations contradict."""
-CERTAIN = 4.0  # number of standard deviations for the bounds of a mass [-]
+"""Masses found at rest and in motion contradict if they differ by more than these kg and standard deviations."""
+CERTAIN = 4.0  # distance of a mass's bounds from the estimate, in standard deviations [-]
 LIGHT = 0.1  # mass below which the centre of mass is not reported [kg]
 
 
@@ -134,8 +134,8 @@ class _Regressor:
 
     def dynamic(self, q: Floats, qd: Floats, qdd: Floats) -> Floats:
         """Return Y(q, q̇, q̈) without the payload's inertia about the flange, shape (n, 4)."""
-        # The payload's inertia is equal for point masses 1 m to either side, so half their difference contains the
-        # moment alone.
+        # Two point masses, 1 m to either side of the flange, have equal inertia. Half the difference of their torques
+        # therefore contains the first moment alone.
         none = self.torque(q, qd, qdd)
         mass, *sides = (np.array(pin.rnea(m, m.createData(), q, qd, qdd)) for m in self._models)
         halves = (0.5 * (there - back) for there, back in zip(sides[::2], sides[1::2], strict=True))
@@ -158,7 +158,7 @@ class _Regressor:
         return _least_squares(rows * weight[:, None], torques * weight)
 
     def of_masses(self, rows: Floats, poses: Sequence[Floats]) -> Floats:
-        """Return standard deviations of (m, m c) due to link masses, see `LINK_MASS`, shape (4,).
+        """Return standard deviations of (m, m c) due to errors of link masses, see `LINK_MASS`, shape (4,).
 
         `rows` are Y of all k poses, shape (n k, 4).
         """

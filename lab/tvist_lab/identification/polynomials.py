@@ -22,7 +22,7 @@ class FitError(ValueError):
 
 
 Deviations = dict[str, Spread]
-"""Deviations of a model from measurements [%], by field of `Provenance`; some are from fits without them."""
+"""Deviations of a model from measurements [%], by field of `Provenance`; some from fits without the measurement."""
 
 
 def polynomials(
@@ -90,5 +90,5 @@ def spread(estimated: Floats, true: Floats) -> Spread:
 
 
 def _solve(design: Floats, y: Floats) -> Floats:
-    """Return the coefficients of least relative deviation."""
+    """Return the coefficients with the least sum of squared relative deviations."""
     return np.asarray(np.linalg.lstsq(design / y[:, None], np.ones_like(y))[0])

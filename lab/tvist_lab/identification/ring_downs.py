@@ -1,4 +1,4 @@
-"""Find usable ring-downs after stops, in which the arm is not driven, nothing shaped, and vibration above noise."""
+"""Find usable ring-downs: after stops, not driven, without a shaper, and with vibration above the noise."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -18,11 +18,11 @@ from tvist_plant.plant import PERIOD
 from tvist_protocol.info import Info
 from tvist_protocol.values import Payload
 
-BEGINS = 7 * PERIOD  # ignored time after a stop, when the deceleration still ends [s]
+BEGINS = 7 * PERIOD  # time after a stop that is ignored, since the deceleration has not ended [s]
 LONGEST, SHORTEST = 0.4, 0.2  # longest and shortest ring-down used [s]
 SLOWEST = 0.01  # longest sampling period that shows an arm's vibration [s]
 LEAST_NOISE = 0.01  # smallest assumed noise, since no model is more accurate [m/s²]
-SIGNAL_TO_NOISE = 1.15  # smallest rms of a ring-down over its noise to contain information [-]
+SIGNAL_TO_NOISE = 1.15  # smallest ratio of rms to noise of a usable ring-down [-]
 BEFORE = 0.15  # time before a motion in which the noise is measured [s]
 INEXACT = 0.1  # share of an everyday ring-down that no linear model explains [-]
 UNSHAPED = 1.5  # number of ticks by which an unshaped reference may seem longer than it is
@@ -56,7 +56,7 @@ class Ringing:
     time: Floats  # times of the samples after the first, shape (T,) [s]
     inexact: float = 0.0  # residual of a linear model beyond the noise, rms per axis [m/s²]
     driven: tuple[complex, ...] = ()
-    """Poles with which the set-point still comes to rest, one of each pair [1/s]; empty if it rests."""
+    """Poles with which the set-point comes to rest after the stop, one of each pair [1/s]; empty if it is at rest."""
     softening: float = 0.0  # share by which hysteresis softens the springs, per amplitude of the tool [1/m]
 
     def rms(self, late: float = 0.0) -> float:
@@ -67,7 +67,7 @@ class Ringing:
 
 @dataclass(frozen=True)
 class Log:
-    """A recording of a robot or a log of another, with how to read its ring-downs."""
+    """A recording of this controller or a log of another, and how to read its ring-downs."""
 
     name: str  # name for users: that of the file, or the number of a jog
     recording: Recording
@@ -99,7 +99,7 @@ class RingDownStop:
     log: str
     motion: int  # number of the motion in the log, from 1
     ringing: Ringing | None
-    reason: str = ""  # why it is not usable, worded alike for stops of the same kind
+    reason: str = ""  # why the ring-down is not usable; equal for stops with the same problem
 
 
 def stops_of(logs: Sequence[Log]) -> tuple[list[RingDownStop], tuple[Payload, ...]]:
@@ -122,7 +122,7 @@ def unused(stops: Sequence[RingDownStop]) -> dict[str, int]:
 
 
 def objection(recording: Recording, motion: MotionRows) -> str:
-    """Return why the acceleration after a motion is not informative; empty if it may be."""
+    """Return why the acceleration after a motion cannot be used; empty if no reason is known."""
     if SENSOR not in recording:
         return f"the log has no {SENSOR}"
     if recording.period > SLOWEST:
@@ -164,7 +164,7 @@ def _stop(log: Log, number: int, motion: MotionRows, payload: int) -> RingDownSt
 
 
 def fresh(recording: Recording) -> NDArray[np.intp]:
-    """Return the rows with new measurements; a robot may repeat the last ones in between."""
+    """Return the rows with new measurements; other rows repeat the measurements of the row before."""
     return np.flatnonzero(np.append(True, np.any(np.diff(recording[SENSOR], axis=0) != 0.0, axis=1)))
 
 

@@ -14,7 +14,7 @@ from tvist_plant.plant import PERIOD
 
 GUESS = (0.008, 0.04, 1500.0)  # delay [s], T [s] and k [1/s²] from which the search starts
 LATEST = 0.2  # longest delay in the search [s]
-FOLLOWS = 0.02  # largest rms error of an arm that follows like this, relative to its way [-]
+FOLLOWS = 0.02  # largest rms error with which this model counts as valid, relative to the way [-]
 MAX_DEVIATION = 0.3  # largest deviation of the logarithms of T and k with which a lag counts as known [-]
 
 
@@ -77,7 +77,7 @@ def followed_by(target: Floats, lag: float, gain: float) -> Floats:
 
 
 def _part(move: Recording) -> tuple[Floats, Floats, Floats]:
-    """Return, of the joint that moves most, the set-point of every tick, and ticks and angles of new measurements."""
+    """Return for the joint that moves most: set-points by tick, and ticks and angles of new measurements."""
     ticks, target = move["tick"] - move["tick"][0], move["target_q"]
     joint = int(np.argmax(np.ptp(target, axis=0)))
     seen = fresh(move)

@@ -1,4 +1,4 @@
-"""Fit a twin: the robot file with which a simulated arm repeats the motions of logs.
+"""Fit a twin: a robot file with which a simulated arm moves like the arm in logs.
 
 Springs and drives start from values fitted to ring-downs. Then all parameters are fitted by simulating each
 motion of the logs again, like a served robot, and comparing the tool's acceleration around the stop, joint
@@ -25,7 +25,7 @@ from tvist_protocol.calibration import ModalParameter
 
 DIFFERENCE_STEP = 1e-3  # step for finite differences, relative to a number's deviation before the fit [-]
 ROUNDS = 5  # largest number of computations of derivatives
-DAMPERS = (0.0, 0.3, 3.0)  # weights of the step's length, each used until it no longer helps [-]
+DAMPERS = (0.0, 0.3, 3.0)  # weights of the step's length; each is used until steps no longer help [-]
 ENOUGH = 0.01  # relative decrease of the cost below which a step does not help [-]
 FEWEST = 4  # smallest number of motions; with fewer, the twin would be little more than the robot file
 AUDIBLE = 1.5  # smallest residual for comparison, relative to the noise of three axes [-]
@@ -33,7 +33,7 @@ AUDIBLE = 1.5  # smallest residual for comparison, relative to the noise of thre
 
 @dataclass(frozen=True)
 class Prediction:
-    """Residual vibration of a motion that the twin has not seen."""
+    """Residual vibration of a motion that was not used in the fit."""
 
     log: str
     motion: int
@@ -51,10 +51,10 @@ class Twin:
     payload: int  # index of the payload that was declared last
     motions: int  # number of motions that were repeated
     others: tuple[RingDownStop, ...]  # motions that were not repeated, with reasons
-    predictions: tuple[Prediction, ...]  # of motions that the fit has not seen
-    quiet: int  # number of further unseen motions that vibrate too little to compare
-    checked: bool  # whether these motions are from separate logs; else each is left out of the fit in turn
-    late_ms: tuple[float, ...]  # delay of another controller's arm after the twin, by motion [ms]
+    predictions: tuple[Prediction, ...]  # predictions of motions that were not used in the fit
+    quiet: int  # number of further such motions that vibrate too little to compare
+    checked: bool  # whether such motions are from separate logs; else each is left out of the fit in turn
+    late_ms: tuple[float, ...]  # lag of another controller's arm behind the twin, by motion [ms]
 
     @property
     def robot(self) -> RobotDescription:
@@ -73,7 +73,7 @@ class Twin:
 
 
 class _Fit:
-    """Motions, and the deviation of twins from them."""
+    """Recorded motions, and the deviations of simulated ones from them for any values of the fitted numbers."""
 
     def __init__(self, parameters: TwinParameters, seen: Sequence[Observed]) -> None:
         self.parameters, self.seen = parameters, tuple(seen)
@@ -81,7 +81,7 @@ class _Fit:
         self.mountings: dict[str, Floats] = {}
 
     def mount(self, values: Floats, motions: Sequence[Observed]) -> None:
-        """Find how the accelerometer of each log is mounted; ours is in the flange's frame."""
+        """Find the mounting of each log's accelerometer; in our recordings its axes are the flange's."""
         pairs: dict[str, list[tuple[Floats, Floats]]] = {}
         for one in motions:
             self.mountings[one.log] = np.eye(3)
@@ -145,7 +145,7 @@ def fit_twin(
     prior = np.diag(parameters.deviation**-2.0)
     whole = sum((slope.T @ slope for slope in slopes), np.zeros_like(prior)) / excess + prior
     progress("predicting motions that the fit has not seen")
-    # Approximate the fit without a motion by one Gauss-Newton step that removes its contribution.
+    # Approximate the fit without a motion by one Gauss-Newton step that removes the motion's contribution.
     moved = [
         np.linalg.solve(whole - slope.T @ slope / excess, slope.T @ one / excess)
         for slope, one in zip(slopes, left, strict=True)
@@ -196,7 +196,7 @@ def _begin(parameters: TwinParameters, modal: Sequence[ModalParameter]) -> Float
 
 def _descend(fit: _Fit, values: Floats, progress: Progress) -> tuple[Floats, list[Floats], list[Floats]]:
     """Fit the numbers; also return the differences of each motion and their derivatives, shape (samples, P)."""
-    # Derivatives take far longer than differences, so each set of them serves for several steps.
+    # Computing derivatives takes far longer than differences, so derivatives are used for several steps.
     deviation = fit.parameters.deviation
     limit = FURTHEST * deviation
 

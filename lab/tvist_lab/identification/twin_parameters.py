@@ -20,25 +20,25 @@ EACH = {
     "coulomb_friction": UNSURE,
     "rotor_inertia": ROTOR,
 }
-"""Standard deviations before the fit of logarithms that each drive has separately [-]."""
+"""Standard deviations, before the fit, of the logarithms of parameters that are fitted for each drive [-]."""
 TOGETHER = {"gear_damping": UNSURE, "position_gain": SET, "integral_gain": 0.5, "friction_width": 0.5}
-"""Standard deviations before the fit of logarithms common to all drives [-]."""
+"""Standard deviations, before the fit, of the logarithms of factors that all drives share [-]."""
 LINKS = {"stiffness": UNSURE, "damping_time": UNSURE}
-"""Standard deviations before the fit of logarithms for bending links [-]."""
+"""Standard deviations, before the fit, of the logarithms of parameters of bending links [-]."""
 MASS = 0.1  # standard deviation of a carried mass from the declared one, relative to the rated payload [-]
-CENTRE = 0.03  # standard deviation of each coordinate of its centre of mass [m]
+CENTRE = 0.03  # standard deviation of each coordinate of the payload's centre of mass [m]
 DIGITS = 9
 FITTED_BELOW = 0.5  # a parameter counts as fitted if the logs reduce its deviation below this share [-]
 
 
 @dataclass(frozen=True)
 class TwinParameter:
-    """A fitted number: a factor on the robot file's value, or an addition to a payload's."""
+    """A fitted number: a factor on a value of the robot file, or an addition to a value of a payload."""
 
     table: str  # `drives`, `link_flexibility` or `payload`
     key: str
     places: tuple[int, ...]
-    """Joints, or places in the list of links, that share it; for a payload, its index and the coordinate."""
+    """Joints, or places in the list of links, that share the number; for a payload, its index and the coordinate."""
     deviation: float  # standard deviation before the fit; of the logarithm for factors
 
 
@@ -83,7 +83,7 @@ class TwinParameters:
         return next(found, None)
 
     def payload(self, values: Floats, number: int) -> Payload:
-        """Return the payload that the arm really carried when the one of this index was declared."""
+        """Return the payload that the arm carried, by these values, when the payload of this index was declared."""
         said = self.payloads[number]
         added = dict.fromkeys((("mass", 0), *(("com", axis) for axis in range(3))), 0.0)
         for entry, value in zip(self.entries, values, strict=True):
@@ -96,8 +96,8 @@ class TwinParameters:
 
     def robot(self, values: Floats, payload: int = 0) -> RobotDescription:
         """Return the robot file, with the payload of this index."""
-        # The wind-up feed-forward keeps its size for the original gears, so that a controller with the fitted
-        # gears leads its drives by as much as the robot's controller did.
+        # The wind-up feed-forward is scaled such that a controller with the fitted gears moves the motors ahead by
+        # as much as the robot's own controller did with the original gears.
         factors: dict[tuple[str, str], Floats] = {}
         size = max(self.description.joints, len(self.description.link_flexibility.links), 1)
         for entry, value in zip(self.entries, values, strict=True):

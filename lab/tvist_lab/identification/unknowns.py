@@ -24,10 +24,10 @@ UNSURE = 0.7  # standard deviation of a guess's logarithm [-]: within a factor o
 SET = 0.2  # deviation of a position gain's logarithm [-]: the maker sets it, and it does not scatter
 ROTOR = 0.2  # deviation of a rotor inertia's logarithm [-]: it is nearly proportional to the drive's torque
 LINK_MASS = 0.03  # relative standard deviation of each link's mass from the description [-]
-PAYLOAD_MASS = 0.04  # deviation of the payload's mass, relative to the rated payload [-]
-SCATTER = 0.12  # relative deviation of a joint from the parameter of its group [-]
-NARROWER = 0.5  # share of the guess's deviation below which a parameter is identified [-]
-FURTHEST = 3.0  # largest deviations of a parameter from the robot file [-]
+PAYLOAD_MASS = 0.04  # standard deviation of the payload's mass, relative to the rated payload [-]
+SCATTER = 0.12  # relative standard deviation of joints that share a parameter [-]
+NARROWER = 0.5  # a parameter counts as identified if its deviation is below this share of the guess's [-]
+FURTHEST = 3.0  # largest change of a parameter from the robot file, in standard deviations [-]
 STEEL = 7850.0  # density from which a payload's size is estimated [kg/m³]
 Z_95 = 1.959963984540054  # standard deviations that contain 95 % of a normal variable [-]
 
@@ -46,9 +46,9 @@ def unknowns(description: RobotDescription) -> tuple[Unknown, ...]:
     """Return the parameters of an arm's linear model: one per large joint, one for all joints of the wrist.
 
     Guesses are the robot file's values (geometric mean for a shared parameter), so that parameters without
-    information stay as in the file. Deviations are wide all the same, since values in a file are often
-    assumed. A gain of zero is guessed as for an arm of about 5 kg payload. Rotor inertia acts on the visible
-    frequencies like more link inertia, so its guess is close.
+    information stay as in the file. Their deviations are wide, since values in a file are often assumed. For a
+    gain of zero, the guess is that of an arm of about 5 kg payload. The deviation of rotor inertias is small,
+    since they act on the visible frequencies like additional link inertia.
     """
     joints = range(description.joints)
     large = max(LARGE, description.joints - WRIST)
@@ -106,7 +106,7 @@ class ArmModes:
         return self._masses[payload](q).copy()
 
     def heavier(self, q: Floats, payload: int) -> list[Floats]:
-        """Return M(q) with each link, and last the payload, heavier by a standard deviation, each (L, L)."""
+        """Return variants of M(q), (L, L): one with each link, the last with the payload, heavier by a deviation."""
         models = (flexible_model(*one) for one in heavier(self.description, body(self.payloads[payload])))
         return [mass_matrix(model)(q).copy() for model in models]
 
@@ -121,7 +121,7 @@ class ArmModes:
 
 
 def heavier(description: RobotDescription, carried: Body) -> list[tuple[RobotDescription, Body]]:
-    """Return descriptions and payloads with one mass each larger by a standard deviation."""
+    """Return pairs of description and payload; in each pair, one mass is larger by a standard deviation."""
     links, found = description.links, []
     for factor in 1.0 + LINK_MASS * np.eye(description.joints):
         mass = tuple((factor * links.mass).tolist())
@@ -147,7 +147,7 @@ def parameter(unknown: Unknown, value: float, deviation: float) -> ModalParamete
 
 
 def ball(mass: float) -> tuple[float, float, float, float, float, float]:
-    """Return the inertia of a steel ball [kg m²], since torques cannot separate the payload's from the rotors'."""
+    """Return the inertia of a steel ball [kg m²]: torques cannot tell the payload's inertia from the rotors'."""
     radius = (3.0 * mass / (4.0 * math.pi * STEEL)) ** (1.0 / 3.0)
     moment = 0.4 * mass * radius**2
     return (moment, 0.0, 0.0, moment, 0.0, moment)

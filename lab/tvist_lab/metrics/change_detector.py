@@ -8,15 +8,15 @@ import numpy as np
 from tvist_lab.recordings import Floats
 
 WINDOWS = (2, 3, 5, 8)
-"""Numbers of latest measurements compared with earlier ones: one may be an outlier, small changes need more."""
+"""Numbers of latest measurements to compare with earlier ones: one may be an outlier, small changes need many."""
 MIN_MEASUREMENTS = 3  # number of earlier measurements that a comparison needs
 KEPT = 40
 SURE_DEVIATIONS = 3.7
-"""Standard deviations beyond which a change is reported if the scatter is known well: more than normal
-measurements need (1 in 5,000), since those of real motions have heavier tails."""
-SHOWN, CLEAR = 2.0, 2.5  # standard errors of the interval in messages, and least of a change
-FARTHEST = 3.5  # largest distance from earlier measurements that counts, in a measurement's own deviations
-BELIEVED = 4.0  # number of measurements that the expected scatter is worth
+"""Standard deviations beyond which a change is reported if the scatter is known well. For normal measurements this
+would be one false report in 5,000; measurements of real motions have heavier tails."""
+SHOWN, CLEAR = 2.0, 2.5  # half interval in messages, and smallest change, both in standard errors
+FARTHEST = 3.5  # number of its deviations to which a measurement's distance from earlier ones is clipped
+BELIEVED = 4.0  # number of measurements that have as much weight as the expected scatter
 OUTLYING = 2.5  # number of deviations beyond which an earlier measurement loses weight
 
 
@@ -33,13 +33,13 @@ class DetectedChange:
 class ChangeDetector:
     """Compares the latest measurements of a quantity with all before, each with its own error.
 
-    Change-point model: neither mean is known, and the likeliest moment of the change counts (Hawkins, Qiu and
-    Kang, Journal of Quality Technology 35, 2003). Scatter between motions beyond the errors is estimated from
-    earlier measurements and the expectation; outliers have less weight (Huber, Annals of Mathematical
-    Statistics 35, 1964). After a reported change, the measurements since then are the new past.
+    Change-point model: the means before and after a change are unknown, and the likeliest moment of a change is
+    taken (Hawkins, Qiu and Kang, J. Quality Technology 35, 2003). Scatter between motions beyond the errors is
+    estimated from earlier measurements and its expectation; outliers have less weight (Huber, Annals of Mathematical
+    Statistics 35, 1964). After a reported change, earlier measurements are forgotten.
 
-    `prior` is the standard deviation of the earlier mean about 0 without any measurement, `scatter` the
-    expected one between motions beyond measurement errors, `least` the smallest change to report.
+    `prior` is the standard deviation of the mean about 0 before any measurement, `scatter` the expected standard
+    deviation between motions beyond measurement errors, `least` the smallest change to report.
     """
 
     def __init__(self, prior: float, scatter: float, least: float) -> None:
@@ -47,7 +47,7 @@ class ChangeDetector:
         self._kept: list[tuple[float, float]] = []
 
     def take(self, value: float, error: float) -> DetectedChange | None:
-        """Take a measurement with its standard error; return the change that it reveals, if any."""
+        """Add a measurement and its standard error; return the change that is detected now, if any."""
         self._kept = [*self._kept[1 - KEPT :], (value, error)]
         found, surest = None, 0.0
         for number in WINDOWS:
@@ -71,7 +71,7 @@ class ChangeDetector:
                     abs(moved) / error_of_it,
                     DetectedChange(mean, after, error_since, int(new.sum())),
                 )
-                if abs(after - mean) < CLEAR * error_since:  # the farthest ones alone say too little
+                if abs(after - mean) < CLEAR * error_since:  # the farthest ones alone are too uncertain
                     found = DetectedChange(mean, mean + moved, error_of_it, number)
         if found is not None:
             self._kept = self._kept[-found.lasting :]

@@ -1,4 +1,4 @@
-"""Find the motion of a recording from which the arm's payload, gears or modes are different."""
+"""Find the motions of a recording after which the arm's payload, gears or modes have changed."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -23,13 +23,13 @@ SCATTER, LEAST = 0.015, 0.04
 """Expected deviation of the logarithm of f_d after stops in one pose, and its smallest reported change [-]."""
 LISTENED = 150  # ticks after a stop in which the vibration is measured
 SHORTEST = 100  # smallest number of these ticks, if the next motion starts sooner
-SETTLED = 50  # number of the last of these ticks in which the gears' deflection is measured
-FRICTION = 0.2  # deviation of friction in a torque at rest, relative to Coulomb friction [-]
-OFF = 1e-4  # deviation of the angle at rest, due to gear errors and integrators [rad]
+SETTLED = 50  # number of last ticks among them in which the gears' deflection is measured
+FRICTION = 0.2  # standard deviation of torques at rest due to friction, relative to Coulomb friction [-]
+OFF = 1e-4  # standard deviation of angles at rest, due to gear errors and integrators [rad]
 VAGUE = 0.25  # relative error from which a gear's compliance counts as unknown in a pose [-]
-HEAVY = 0.7  # error from which a motion's mass is ignored [kg]
+HEAVY = 0.7  # error of a mass from which the mass found after a motion is ignored [kg]
 MASS, GEAR, MODES = (1.0, 0.15, 0.7), (0.4, 0.05, 0.15), (0.1, 0.02, 0.03)
-"""Arguments of the detectors: prior, expected scatter, smallest reported change; in kg, else of logarithms."""
+"""Detectors' prior, expected scatter and smallest reported change: of mass in kg, of gears and modes of logarithms."""
 UNKNOWN = 0.4  # share of Coulomb friction that may be unknown in each joint, with the worst sign [-]
 
 
@@ -142,7 +142,7 @@ class FitMonitor:
             yield from _told(self._modes.take(u, error), _of_modes)
 
     def _felt(self, q: Floats, feedback: Floats) -> tuple[float, float]:
-        """Return the mass that explains the drives' feedback at rest, and its bound from friction [kg]."""
+        """Return the mass that explains the drives' feedback at rest, and its largest error due to friction [kg]."""
         per_kg = holding_torque(self._loaded, q) - holding_torque(self._arm, q)
         weighted = per_kg / self._unsure**2
         square = float(weighted @ per_kg)

@@ -20,7 +20,7 @@ from tvist_lab.metrics.vibration import (
 from tvist_lab.recordings import Floats, Recording
 
 STILL = 0.1  # |α| below which an arm counts as at rest [m/s²]
-AFTER_STOP = 0.010  # time after the stop when the last ramp has passed [s]
+AFTER_STOP = 0.010  # time after the stop from which the deceleration no longer shows [s]
 
 NOISE_PEAK = 5.0  # largest |α| of noise within some seconds, relative to its rms in one axis [-]
 NOISE_TAIL = 0.2  # time at the end of a rest in which the sensor shows its noise [s]
@@ -75,8 +75,8 @@ def _gravity(recording: Recording, motion: MotionRows, shown: NDArray[np.bool_])
 
 
 def vibration_after_stop(recording: Recording, motion: MotionRows) -> tuple[float, float]:
-    """Return the largest |α| and envelope after the unshaped stop plus the declared delay [m/s²]."""
-    # In a log of another controller, the arm's own stop plus 10 ms counts.
+    """Return the largest |α| and the largest envelope after the unshaped stop plus the declared delay [m/s²]."""
+    # In a log of another controller, take values later than 10 ms after the arm's own stop.
     _, alpha = acceleration_of(recording, motion, _after_declared_stop(recording, motion), smooth=True)
     if len(alpha) < 2:
         raise NotMeasurableError("nothing was recorded after the stop")
@@ -84,7 +84,7 @@ def vibration_after_stop(recording: Recording, motion: MotionRows) -> tuple[floa
 
 
 def still_after(recording: Recording, motion: MotionRows, threshold: float = STILL) -> float:
-    """Return the last time |α| exceeds a threshold [m/s²], from the start of the unshaped reference [s]."""
+    """Return the last time at which |α| exceeds a threshold [m/s²], from the start of the unshaped reference [s]."""
     # Use the truth channel if there is one, otherwise the sensor below 60 Hz.
     time, alpha_xyz = acceleration_of(recording, motion, slice(motion.start, motion.end), smooth=True)
     alpha = amplitude(alpha_xyz)

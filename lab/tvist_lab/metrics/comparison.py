@@ -20,9 +20,9 @@ from tvist_lab.recordings import Floats, Recording
 
 SAME = 0.02  # largest difference of a joint angle at start and end between motions that correspond [rad]
 COMPARED = IMPACTS | {"still_after": "still_after_ms", "peak": "peak_m_s2", "envelope": "envelope_m_s2"}
-"""Names of the impacts, and the figures of a motion that they compare."""
+"""Names of changes due to shaping, and the field of a motion's result that each compares."""
 TICK_MS = 2.0  # shortest delay of a shaped reference [ms]: one tick
-SAME_DURATION = (0.02, 0.01)  # largest difference in duration at the same speed: [-], or [s]
+SAME_DURATION = (0.02, 0.01)  # largest difference in duration of equal motions: relative [-], or [s]
 REFERENCE = "reference_q"
 
 
@@ -44,7 +44,7 @@ class MotionChange:
 
     @property
     def gain_ms(self) -> int | None:
-        """How much earlier the tool is at rest [ms], negative if later; None if it never is."""
+        """Time by which the tool is at rest earlier [ms], negative if later; None if it does not come to rest."""
         if self.still_before is None or self.still_after is None:
             return None
         return round(self.still_before - self.still_after)
@@ -180,12 +180,12 @@ class MotionPair:
     shaper: str
     """Name of the shaper; empty if the recording does not name it."""
     name: str
-    """Named poses at its ends, `Q1 → Q3`, else the numbers of both motions."""
+    """Named poses at the motion's ends, such as `Q1 → Q3`; if an end has no name, the numbers of both motions."""
     change: MotionChange
 
 
 def pairs(measured: MeasuredRecording) -> list[MotionPair]:
-    """Pair each unshaped motion with the same one by each shaper, in the order in which they were made."""
+    """Pair each unshaped motion with the same motion by each shaper, in the order in which the robot made them."""
     # Motions are the same if their references before shaping start and end at the same joint angles within
     # 0.02 rad, and last equally long within 2 %. Events tell whether a motion was shaped, else its delay
     # does.

@@ -1,4 +1,4 @@
-"""Find motions in measured joint angles, and how late an arm follows its target."""
+"""Find motions in measured joint angles, and the lag of an arm behind its target."""
 
 import math
 
@@ -9,30 +9,30 @@ from tvist_lab.metrics.vibration import SENSOR, low_pass_at
 from tvist_lab.recordings import Floats, Recording
 
 SMOOTHED = 20.0  # cut-off frequency of the angles before they are differentiated [Hz]
-REST_SPEED = 0.01  # speed below which a joint may be at rest [rad/s]
-FAST = 2.0  # smallest speed that a motion must reach, relative to the speed that ends it [-]
-SWING = 0.5  # time around a fast motion in which the arm swings back from its overshoot [s]
-SWUNG = 0.02  # largest speed of a joint that swings back, relative to the fastest within that time [-]
+REST_SPEED = 0.01  # speed above which a joint certainly moves [rad/s]
+FAST = 2.0  # largest speed of a motion must exceed the speed at its ends by this factor [-]
+SWING = 0.5  # time around a fast motion in which the arm may swing back from an overshoot [s]
+SWUNG = 0.02  # largest speed of swinging back, relative to the largest speed within that time [-]
 DRIVEN = 0.15  # longest time after a stop in which joints may still be driven [s]
 PAUSE = 0.1  # rests shorter than this belong to a motion, as at a reversal or while the arm vibrates [s]
 SMALLEST = 0.005  # smallest displacement of a motion [rad]; less is vibration
 FEWEST = 16  # smallest number of rows in which motions are sought
 TAPER = 0.03  # longest time for which a joint may have moved below `REST_SPEED` before and after [s]
 LONGEST_LAG = 0.2  # longest lag in the search [s]
-FOLLOWS = 0.05  # largest variance of the distance that follows, relative to the target's [-]
+FOLLOWS = 0.05  # largest variance of an arm's distance to its delayed target, over the target's [-]
 LONGEST_FELT = 0.08  # longest lag in the search with the accelerometer [s]
-FINE = 0.002  # longest step of that search [s]
+FINE = 0.002  # longest step of the search with the accelerometer [s]
 SMOOTHED_TARGET = 40.0  # cut-off frequency of the target before it is differentiated twice [Hz]
 EXPLAINED = 0.5  # largest share of the accelerometer signal that may remain unexplained [-]
 FEWEST_SEEN = 8
 
 
 def measured_spans(recording: Recording, name: str = "actual_q") -> list[tuple[int, int]]:
-    """Return first and last row of each motion of joint angles that are never quite at rest, in order.
+    """Return first and last row of each motion, in order, from joint angles that are noisy even at rest.
 
     A joint moves while its speed exceeds 0.01 rad/s, six times the encoders' noise, and 2 % of the fastest speed
-    within half a second, which excludes swinging back. Each motion must reach twice that speed. Both ends are then
-    shifted outwards by the time in which a steadily changing speed reaches this threshold, at most 30 ms.
+    within half a second, which excludes swinging back. Each motion must reach twice this threshold. Both ends are then
+    shifted outwards by the time in which a speed that grows steadily reaches the threshold, at most 30 ms.
     """
     seen = np.flatnonzero(np.isfinite(recording[name]).all(axis=1))
     if len(seen) < FEWEST:
@@ -76,7 +76,7 @@ def still_driven(recording: Recording, start: int, stop: int) -> float:
 
 
 def _onwards(q: Floats, velocity: Floats, first: int, last: int) -> Floats:
-    """Return the speed towards a motion's end [rad/s], negative while swinging back; to and fro, its magnitude."""
+    """Return the speed towards a motion's end [rad/s], negative while swinging back; |speed| for motions to and fro."""
     joint = int(np.argmax(np.abs(q[last] - q[first])))
     way, travelled = q[last, joint] - q[first, joint], np.sum(np.abs(np.diff(q[first : last + 1, joint])))
     rates = velocity[first : last + 1]
@@ -86,7 +86,7 @@ def _onwards(q: Floats, velocity: Floats, first: int, last: int) -> Floats:
 
 
 def _noise_of_speed(q: Floats, period: float) -> float:
-    """Return the standard deviation of the speed that is computed from resting, smoothed encoders [rad/s]."""
+    """Return the standard deviation of the speed that is computed from smoothed encoders at rest [rad/s]."""
     second = np.diff(q, n=2, axis=0)
     noise = float(np.max(np.median(np.abs(second), axis=0))) / (0.6745 * math.sqrt(6.0))
     cut_off = min(SMOOTHED, 0.45 / period)
@@ -94,7 +94,7 @@ def _noise_of_speed(q: Floats, period: float) -> float:
 
 
 def _taper(time: Floats, speed: Floats, row: int, inwards: int) -> float:
-    """Return the time in which a speed that grows with the square of time reaches its value in a row [s]."""
+    """Return the time in which the speed has reached its value in a row, if it grew with the square of time [s]."""
     other = row + 3 * inwards
     if not 0 <= other < len(time):
         return 0.0
@@ -103,10 +103,10 @@ def _taper(time: Floats, speed: Floats, row: int, inwards: int) -> float:
 
 
 def servo_lag(recording: Recording, start: int, stop: int) -> float | None:
-    """Return the time by which `actual_q` follows `target_q` in a motion [s], never below zero; None if it does not.
+    """Return the lag of `actual_q` behind `target_q` in a motion [s], at least 0; None if the arm does not follow.
 
-    It is the shift of the target from row `start` to `stop` with least squared distance to the measured angles, to a
-    tenth of a sample; without them, the shift with which the target's accelerations best explain the tool's.
+    The lag is the shift, to a tenth of a sample, of the target from row `start` to `stop` that has the least squared
+    distance to the measured angles. Without these, its accelerations best explain the tool's.
     """
     if "target_q" not in recording:
         return None
@@ -134,7 +134,7 @@ def servo_lag(recording: Recording, start: int, stop: int) -> float | None:
 
 
 def _felt_lag(recording: Recording, start: int, stop: int) -> float | None:
-    """Return the lag with which the target's accelerations explain the tool's accelerometer [s]; None if none does."""
+    """Return the lag with which the target best explains the tool's accelerometer [s]; None if it hardly does."""
     if SENSOR not in recording:
         return None
     time, period = recording.time, recording.period
@@ -148,7 +148,7 @@ def _felt_lag(recording: Recording, start: int, stop: int) -> float | None:
     velocity = np.gradient(moved, own, axis=0)
     acceleration = np.gradient(velocity, own, axis=0)
     felt = recording[SENSOR][shown]
-    # Slow terms stand for gravity, which turns slowly in the tool's frame.
+    # Polynomials in time stand for gravity, whose direction in the tool's frame changes slowly.
     slow = np.vander((time[shown] - own[0]) / (own[-1] - own[0]), 4)
     felt = felt - slow @ np.linalg.lstsq(slow, felt)[0]
 

@@ -13,13 +13,13 @@ from tvist_lab.metrics.vibration import parts
 from tvist_lab.recordings import Floats, Recording
 
 MOVING = 1e-7  # change per tick above which a reference moves [rad]
-JUMP = 0.05  # change per tick above which a reference was set elsewhere; 25 rad/s [rad]
-TICK = 0.002  # time in which that change counts as a jump [s]; longer if a log has longer ticks
-REST = 0.02  # rests of a reference that are shorter, as at a reversal, belong to the motion [s]
+JUMP = 0.05  # change per tick above which a reference did not move but was reset; 25 rad/s [rad]
+TICK = 0.002  # tick for which `JUMP` is given [s]; in logs with longer ticks a jump is larger
+REST = 0.02  # a rest of the reference shorter than this, as at a reversal, belongs to the motion [s]
 AT_REST = 1e-6  # target speed below which another controller's arm is at rest [rad/s]
-MOSTLY = 0.98  # share of moving rows from which a target's speed is never zero and so was measured [-]
-TINY = 5e-4  # largest displacement of a joint that only trembles [rad]
-EARLY = 0.05  # time before a motion found in measured angles that no longer counts as rest [s]
+MOSTLY = 0.98  # share of moving rows above which a target's speed must be a measured one, never zero [-]
+TINY = 5e-4  # largest displacement that may be noise instead of a motion [rad]
+EARLY = 0.05  # time before a motion found in measured angles that does not count as rest [s]
 DIFFERENTIATOR_TICKS = 1
 """The published target of tick i is the shaped reference of tick i-1, due to the central difference."""
 
@@ -29,7 +29,7 @@ class MotionRows:
     """One motion of the reference, as row indices of its recording."""
 
     start: int
-    """Last row in which the reference is still at its start."""
+    """Last row in which the reference has not moved yet."""
     reference_stop: int
     """Last row in which the reference before shaping moves by more than 1e-7 rad."""
     shaped_stop: int
@@ -125,7 +125,7 @@ def _motions(recording: Recording) -> list[MotionRows]:
 
 
 def _driven(recording: Recording) -> NDArray[np.bool_] | None:
-    """Return the rows in which the target's speed is not zero, if a foreign log has it and it is zero at rest."""
+    """Return where the target's speed is not zero, shape (T,); None unless a foreign log has one that is 0 at rest."""
     if not recording.foreign or "reference_q" in recording or "target_qd" not in recording:
         return None
     moving = np.asarray((np.abs(recording["target_qd"]) > AT_REST).any(axis=1))
@@ -139,7 +139,7 @@ def _displacement(recording: Recording, first: int, past: int) -> float:
 
 
 def _trembles(recording: Recording, spans: Sequence[tuple[int, int, Any, bool]]) -> bool:
-    """Whether the target changes at rest like measured angles do: most of its motions are tiny."""
+    """Whether the target changes at rest, like measured angles: at least two motions and over a quarter are tiny."""
     tiny = [_displacement(recording, *span[:2]) < TINY for span in spans]
     return sum(tiny) > max(1, len(tiny) // 4)
 
@@ -163,7 +163,7 @@ def _step_per_tick(recording: Recording, name: str) -> Floats:
 
 
 def _spans_of_events(recording: Recording) -> list[tuple[int, int, Any, bool]]:
-    """Return the rows in which each started motion's reference can move, its number, and whether it was stopped."""
+    """Return of each motion first row, row after the last, number, and whether it was stopped, from events."""
     started = [event for event in recording.events if event.kind == "motion_started"]
     ended = {event.id: event for event in recording.events if event.kind in ("motion_done", "motion_stopped")}
     spans = []
@@ -179,7 +179,7 @@ def _spans_of_events(recording: Recording) -> list[tuple[int, int, Any, bool]]:
 
 
 def _spans_of_reference(recording: Recording, moving: NDArray[np.bool_]) -> list[tuple[int, int, Any, bool]]:
-    """Return runs of rows in which the reference moves, joined across short rests."""
+    """Return spans as `_spans_of_events` does, from the rows in which the reference moves; short rests are joined."""
     rows = np.flatnonzero(moving)
     if not rows.size:
         return []

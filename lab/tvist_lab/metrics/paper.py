@@ -26,9 +26,9 @@ class Settling:
     cycle: float
     """t_cycle: last time at which E is above the repeatability [s]."""
     stabilisation: float
-    """t_stb = t_cycle - t_enter [s]; zero if E never leaves the band again."""
+    """t_stb = t_cycle - t_enter [s]; zero if E stays within the repeatability after t_enter."""
     overshoot: float
-    """e_os: largest E after t_enter, zero if that is within the repeatability [m]."""
+    """e_os: largest E after t_enter [m]; zero if it is within the repeatability."""
 
 
 def attained_position(recording: Recording, motion: MotionRows) -> Floats:
@@ -135,7 +135,7 @@ def residual(recording: Recording, motion: MotionRows) -> Residual:
 def _exponential(t: Floats, y: Floats) -> tuple[float, float]:
     """Return value at t = 0 and rate of the decaying exponential closest to the points, on a linear scale."""
     slope, log_value = np.polyfit(t, np.log(y), 1)
-    # A search that starts at its bound is slow to leave it.
+    # Start the search inside its bounds, since it is slow to leave a bound.
     fit = least_squares(
         lambda p: p[0] * np.exp(-p[1] * t) - y,
         [float(np.exp(log_value)), max(-float(slope), 1.0)],

@@ -1,4 +1,4 @@
-"""Compare the modes that ring after a stop with those of an arm's model."""
+"""Compare the frequencies of the vibration after a stop with those of an arm's model."""
 
 import math
 from collections.abc import Iterable
@@ -16,7 +16,7 @@ from tvist_shaping.errors import EstimatorError
 from tvist_shaping.estimators.drivetrain import Drivetrain
 from tvist_shaping.estimators.modal import Modal
 
-MODES = 4  # number of modes that may ring, from the lowest
+MODES = 4  # number of modes that may vibrate, from the lowest
 HIGHEST = 100.0  # largest frequency of a mode [Hz]
 SKIP = 3  # ticks after the stop that are ignored, since the end of the deceleration is no ring-down
 SCALES = np.linspace(-0.4, 0.3, 29)  # logarithms of the common frequency factors to try
@@ -25,13 +25,13 @@ BASES = np.geomspace(1e6, 3e4, 20)
 CORRELATED_SAMPLES = 3.0  # number of samples that count as one, since the residual is correlated in time
 EXPECTED = 0.07  # standard deviation of the factor's logarithm before any measurement
 UNLIKE, ELSEWHERE = 0.05, 0.1
-"""Standard deviation of the factor between poses, and share of stops that ring in something else."""
-VAGUE = 0.1  # standard error from which a stop is ignored because it did not ring
+"""Standard deviation of the factor between poses, and share of stops with vibration of other parts than the arm."""
+VAGUE = 0.1  # standard error from which a stop is ignored because it hardly vibrated
 FIRST = 8  # number of stops from which the stiffness of the base is found
 
 
 def unexplained(alpha: Floats, f_d: Floats, zeta: Floats) -> Floats:
-    """Return the energy of a ring-down without modes, constant and slow tail, for each factor in `SCALES` [m²/s⁴].
+    """Return the energy that modes, constant and slow tail leave unexplained, for each factor in `SCALES` [m²/s⁴].
 
     `alpha` [m/s²], shape (T, 3), starts `SKIP` ticks after the stop; `f_d` [Hz], before scaling, and `zeta`
     have shape (k,).
@@ -48,12 +48,12 @@ def unexplained(alpha: Floats, f_d: Floats, zeta: Floats) -> Floats:
 
 
 class RingListener:
-    """Finds the factor between all modes after a stop and those of a model, f_d = e^u f_model(q).
+    """Finds the common factor between the frequencies after a stop and a model's, f_d = e^u f_model(q).
 
     The amplitudes of the modes enter linearly and are eliminated (variable projection; Golub and Pereyra,
-    1973), so each u has a sum of squares and hence a likelihood, which is flat if a stop hardly rings. The
-    stiffness of the arm's mounting is unknown; the model stands on a flexible base whose stiffness is found
-    once, as the likeliest for the first `FIRST` stops.
+    1973), so each u has a sum of squares and hence a likelihood; if a stop hardly vibrates, it is nearly constant.
+    Since the stiffness of the arm's mounting is unknown, the model stands on a flexible base. The stiffness of this
+    base is found once: the likeliest for the first `FIRST` stops.
     """
 
     def __init__(self, description: RobotDescription, payload: Payload) -> None:
@@ -67,7 +67,7 @@ class RingListener:
         self._base: int | None = None
 
     def study(self, alpha: Floats, q: Floats) -> list[tuple[float, float]]:
-        """Return u and its standard error [-] from a ring-down in a pose; none if it did not ring.
+        """Return u and its standard error [-] from the ring-down in a pose; none if the arm hardly vibrated.
 
         `alpha` [m/s²], shape (T, 3), are readings from the stop on, with gravity; `q` [rad] has shape (n,).
         Until the base is found, nothing is returned; then the results of all earlier stops are included.
@@ -102,14 +102,14 @@ def _certain(likelihoods: Iterable[Floats]) -> list[tuple[float, float]]:
         mean = float(np.average(SCALES, weights=weights))
         spread = float(np.average((SCALES - mean) ** 2, weights=weights))
         error = math.sqrt(spread + (SCALES[1] - SCALES[0]) ** 2 / 12.0)
-        # A maximum at an end means that something else rings, or that modes were confused.
+        # A maximum at an end means that something else vibrates, or that modes were confused.
         if error < VAGUE and 0 < np.argmax(likely) < len(SCALES) - 1:
             found.append((mean, error))
     return found
 
 
 def _blurred(likely: Floats) -> Floats:
-    """Return a stop's log-likelihood, shape (bases, scales): poses differ and some stops are uninformative."""
+    """Return a stop's log-likelihood, (bases, scales), widened for differences of poses and other vibrations."""
     spread = np.exp(-0.5 * ((SCALES[:, np.newaxis] - SCALES) / UNLIKE) ** 2)
     near = np.exp(likely) @ (spread / spread.sum(axis=0))
     anything = np.exp(likely).mean(axis=1).max()

@@ -13,13 +13,13 @@ from tvist_lab.metrics.vibration import SENSOR, NotMeasurableError, parts
 from tvist_lab.recordings import Floats, Recording
 
 LEVEL = 0.05  # time over which the level of a vibration is averaged [s]
-LOUD = 4.0  # level relative to that of the quietest tenth of a log from which something vibrates [-]
+LOUD = 4.0  # level that counts as vibration, relative to the level of the quietest tenth of a log [-]
 ONSET = 0.25  # longest time from the start of a vibration to its peak in a ring-down [s]
 SWEEP, BLOCK = 3.0, 0.5  # shortest sweep, and duration of its parts, each with one frequency [s]
-RISING = 0.8  # smallest rank correlation of these frequencies with time [-]
+RISING = 0.8  # smallest rank correlation of a sweep's frequencies with time [-]
 EDGE = 1.1  # smallest ratio of a mode to the ends of a sweep [-]
 EXPLAINED = 0.8  # smallest share of the energy that damped sines must explain [-]
-SCALED = 15.0  # frequency in the middle of the fit's range to which the strongest one is scaled [Hz]
+SCALED = 15.0  # frequency to which the strongest is scaled, in the middle of the fit's range [Hz]
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ IMPACTS = {
 }  # impacts listed in the paper, and their columns
 
 SKIP_OF_MEASURED = 0.03
-"""Time after a stop found in measured angles that the ring-down ignores [s]: the stop may be too early."""
+"""Time after a stop that a ring-down ignores if the stop was found in measured angles, maybe too early [s]."""
 
 Row: TypeAlias = dict[str, float | None]
 Table: TypeAlias = dict[str, dict[str, Row]]
@@ -177,7 +177,7 @@ def _mode(mode: Mode) -> dict[str, Any]:
 
 
 def _suspicion(modes: Sequence[Mode]) -> str:
-    """Return a note if a mode has suspiciously more damping than a lighter one near it."""
+    """Return a note if a mode is suspicious: a mode of similar frequency has much less damping."""
     for mode in modes:
         if (near := lighter_beside(mode, modes)) is not None:
             return (
@@ -202,7 +202,7 @@ def ring_down_of(recording: Recording, motion: MotionRows) -> RingDown:
 
 
 def table_2(runs: Mapping[str, Runs]) -> Table:
-    """Return means over the runs, and the impact of shaping, 100 (mean shaped / mean unshaped - 1) [%]."""
+    """Return means over the runs, and the change by shaping, 100 (mean shaped / mean unshaped - 1) [%]."""
     # Runs in which a metric was not measurable are left out of its mean; values that are not defined are
     # None.
     table: Table = {}
@@ -241,7 +241,7 @@ def reduction_percent(before: Quantity, after: Quantity) -> Quantity:
 
 
 def impact_percent(unshaped: float | None, shaped: float | None) -> float | None:
-    """Return the change from the first to the second value [%]; None where it is not defined."""
+    """Return the change from the first to the second value [%]; None if it is not defined."""
     if unshaped is None or shaped is None or unshaped == 0.0:
         return None
     return 100.0 * (shaped / unshaped - 1.0)

@@ -59,7 +59,7 @@ def low_pass(signal: Floats, period: float, cut_off: float = BAND[1]) -> Floats:
 
 
 def low_pass_at(time: Floats, signal: Floats, period: float, cut_off: float = BAND[1]) -> Floats:
-    """Low-pass filter samples of which some are missing; they are interpolated first, and left out of the result.
+    """Low-pass filter samples with gaps; missing samples are interpolated first, and left out of the result.
 
     Parts separated by a long gap are filtered separately to bound the memory. `time` [s] has shape (T,),
     `signal` (T, k); `period` [s] is that without gaps, `cut_off` in Hz.

@@ -19,7 +19,7 @@ from tvist_plant.user_file import UserFileError, read_text
 
 
 def broken(limits: RunLimits, watch: ProgramWatch) -> Iterator[Shortcoming]:
-    """Yield where and when a run broke each limit, and each stop with too much vibration."""
+    """Yield place and time at which a run exceeded each limit, and each stop with too much vibration."""
     if limits.max_seconds is not None and watch.seconds > limits.max_seconds:
         yield _more(limits, "max_seconds", f"it ran for {watch.seconds:.3f} s", None)
     if limits.max_shake is not None:
@@ -31,7 +31,7 @@ def broken(limits: RunLimits, watch: ProgramWatch) -> Iterator[Shortcoming]:
 
 
 def missed(limits: RunLimits, plant: Plant) -> list[Shortcoming]:
-    """Return the bodies that are not where they are expected."""
+    """Return the bodies that are not in the areas where they are expected."""
     said = (_missed(text, plant) for text in limits.expect or ())
     return [Shortcoming("expect", f"{text} (--expect)") for text in said if text is not None]
 
@@ -105,7 +105,7 @@ def is_inside(area: Shape, at: Floats) -> bool:
 
 # ---------------------------------------------------------------------- an earlier run
 
-Run = Mapping[str, Any]  # what --json prints of a program
+Run = Mapping[str, Any]  # output of --json for a program
 ROUNDING = {"_s": 0.5 * PERIOD, "seconds": 0.5 * PERIOD}
 """Differences of times that are ignored, by the end of the key [s]."""
 SHARES = {"_m_s2": 1e-3, "_rad_s": 1e-4, "_m_s": 1e-4}
@@ -127,7 +127,7 @@ def read_baseline(path: Path, files: Sequence[str]) -> Mapping[str, Run]:
         runs = {run["file"]: run for run in content.get("programs", [content])}
         in_real_time = [file for file, run in runs.items() if not run.get("lockstep", True)]
         for run in runs.values():
-            for name, value in _points(run).items():  # whether they can be compared
+            for name, value in _points(run).items():  # check that figures can be compared
                 _differ(name, value, value)
             _warned(run)
     except (
@@ -161,7 +161,7 @@ def changes(before: Run, now: Run) -> Iterator[Shortcoming]:
 
 
 def _points(run: Run) -> dict[str, Any]:
-    """Return the figures of a run to compare; if it did not compile, only the error."""
+    """Return the figures of a run that are compared; if the program did not compile, only the error."""
     points: dict[str, Any] = {"exit_reason": run["exit_reason"]}
     if run["exit_reason"] == "compile_error":
         return points

@@ -16,7 +16,7 @@ MEASURES = ("seconds", "largest_peak_after_stop_m_s2")
 
 @dataclass(frozen=True)
 class Shortcoming:
-    """A reason for which a run counts as failed."""
+    """A reason why a run counts as failed."""
 
     kind: str  # how the run ended, a limit such as `max_shake`, `expect`, `baseline`, or `recording`
     text: str
@@ -73,8 +73,8 @@ def _in_world(watch: ProgramWatch) -> dict[str, Any]:
 
 
 def seconds(ticks: int) -> float:
-    """Return the time of a tick, as in `timestamp` of `state`, or of a number of ticks [s]."""
-    return round(ticks * PERIOD, 6)  # 0.002 is no binary number
+    """Convert a tick to its time, as in `timestamp` of `state`, or a number of ticks to a duration [s]."""
+    return round(ticks * PERIOD, 6)  # a float cannot represent 0.002 exactly
 
 
 def _message(said: ProgramMessage) -> dict[str, Any]:
@@ -100,7 +100,7 @@ def _fastest(fastest: Fastest, unit: str) -> dict[str, Any]:
 
 
 def junit(results: Sequence[Mapping[str, Any]]) -> bytes:
-    """Convert what --json prints of programs to JUnit XML: a test suite with a case for each."""
+    """Convert the output of --json for programs to JUnit XML: a test suite with a case for each program."""
     # A case has the robot's time, measurements as properties, a sentence for each failure, the program's
     # messages in `system-out` and warnings in `system-err`.
     counts = {

@@ -1,4 +1,4 @@
-"""Run a program on a robot from tick 0, so that equal programs run alike to the last bit."""
+"""Run a program on a robot from tick 0, so that equal programs give states that are equal to the last bit."""
 
 import asyncio
 import re
@@ -47,7 +47,7 @@ def run_in_lockstep(
     attend: Callable[[ProgramWatch], None],
     on_record_error: Callable[[str], None],
 ) -> ProgramWatch:
-    """Run a program in this process without network until it has ended and the arm is at rest.
+    """Run a program in this process, without network, until the program has ended and the arm is at rest.
 
     Its states equal those of a run in real time, to the last bit. `inputs` are NAME=VALUE; `timeout` is robot
     time [s]; `attend` is called after new messages and regularly; `on_record_error` is called from another

@@ -15,11 +15,11 @@ from tvist_plant.plant import PERIOD, Plant, Response
 from tvist_plant.tool_acceleration import tool_acceleration
 from tvist_protocol.stream import Event, State
 
-AFTER_STOP = 5  # ticks after a stop (10 ms) from which the peak is sought, when the last ramp has passed
+AFTER_STOP = 5  # ticks after a stop (10 ms) from which the peak is sought, when the deceleration has ended
 SEEN = 50  # ticks of rest (0.1 s) in which the vibration is measured; after a shorter rest, it is predicted
 WINDOW = 150  # ticks after a stop (0.3 s) in which the peak is sought, as for the paper's residual vibration
 KEPT = 5000
-"""Most arm states (50 MB) that a real-time run keeps for `ProgramMove.peak`; later stops without rest have none."""
+"""Most arm states (50 MB) kept for `ProgramMove.peak` in real time; later stops without rest have no peak."""
 LINGER = 2500  # most ticks (5 s) for which a moving arm is observed after the end of its program
 
 Reason = Literal[
@@ -58,17 +58,17 @@ class ProgramMove:
     stopped: str | None = None  # why it was stopped before its target; None if it was not
     rests: int | None = None  # tick at which the shaped reference came to rest, if before the next
     followed: int | None = None  # tick at which the next motion started; None if none did
-    rested: int = 0  # ticks of rest after it, as far as the vibration is measured
+    rested: int = 0  # ticks of rest after the motion in which the vibration was measured
     peak_so_far: float | None = None  # largest tool acceleration measured until now [m/s²]; None if none was
     held: Callable[[int], Response] | None = None
-    """Predicts the arm at rest; None if the vibration was measured instead."""
+    """Predicts the arm's response if it stays at rest; None if the vibration was measured instead."""
 
     @cached_property
     def peak(self) -> float | None:
         """Largest tool acceleration without gravity from 10 ms until 0.3 s after the stop [m/s²].
 
-        If the next motion started within 0.1 s, it is a prediction for an arm at rest. None without rest or
-        measurement. Ask only after the next motion has started, since it is computed once.
+        If the next motion started within 0.1 s, the peak is predicted as if the arm had stayed at rest. None without
+        rest or measurement. Ask only after the next motion has started, since the peak is computed once.
         """
         if self.held is None:
             return self.peak_so_far if self.rested >= SEEN else None
@@ -190,9 +190,9 @@ class ProgramWatch(Sink):
                 self._note_end(event)
 
     def state(self, state: State) -> None:
-        """Process a tick's state, which comes after its events."""
+        """Process a tick's state; the tick's events come before it."""
         self.tick = state.tick
-        while self._placeless:  # a program's line is known between its turns
+        while self._placeless:  # the line is known when the program has computed its tick
             self._placeless.pop().line = self.line
         self._note_speeds(state)
         at_rest = self._controller.cycle.mode.at_rest
@@ -245,7 +245,7 @@ class ProgramWatch(Sink):
         self._rest = 0
 
     def _note_next(self, move: ProgramMove, tick: int) -> None:
-        """Note the start of the next move; in real time, the prediction of the arm at rest is computed later."""
+        """Note that the next move starts; predict the peak of this move, in real time later."""
         move.followed = tick
         if move.held is None:
             return
@@ -257,7 +257,7 @@ class ProgramWatch(Sink):
             move.held = None
 
     def _note_end(self, event: Event) -> None:
-        for move in self.moves[-2:]:  # the next one may begin in the tick in which this one ends
+        for move in self.moves[-2:]:  # the next move may begin in the tick in which this move ends
             if move.id == event.id and move.ended is None:
                 move.ended = event.tick
                 if event.kind == "motion_stopped":

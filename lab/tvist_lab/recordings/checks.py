@@ -84,7 +84,7 @@ def check_numbers(path: Path, columns: Mapping[str, Floats], places: Places) -> 
 
 
 def check_period(path: Path, period: float) -> None:
-    """Refuse times that are not in seconds, or too far apart."""
+    """Refuse a period that is too short or too long, since times may not be in seconds."""
     if not PERIODS[0] <= period <= PERIODS[1]:
         raise LogError(
             f"{path}: {TIME} grows by {period:.3g} from row to row: it must be in seconds, with a row every "
@@ -93,7 +93,7 @@ def check_period(path: Path, period: float) -> None:
 
 
 def check_recording(path: Path, recording: Recording, places: Places | None = None) -> None:
-    """Refuse a recording that cannot be analysed; `places` tells where its rows are in the file [their ticks]."""
+    """Refuse a recording that cannot be analysed; `places` are the rows' positions in the file, by default ticks."""
     info, columns, tick, time = recording.info, recording.columns, recording["tick"], recording.time
     check_names(path, [*columns, *([] if info is None else [info.name, info.model, info.version])])
     joints = max((columns[name].shape[1:] for name in ANGLES if name in columns), default=())
@@ -112,6 +112,6 @@ def check_recording(path: Path, recording: Recording, places: Places | None = No
         raise LogError(
             f"{path}, tick {tick[back[0] + 1]:.0f}: {TIME} goes from {before:.6f} to {after:.6f} s: must increase"
         )
-    # The clock of another controller may not be in step with its ticks.
+    # The clock of another controller need not agree with its ticks.
     for period in (np.median(periods), recording.period, *([] if recording.foreign else [np.max(periods)])):
         check_period(path, float(period))

@@ -1,4 +1,4 @@
-"""Names and units of a log's columns: convert those of users, vendors and UR to RTDE's."""
+"""Names and units of a log's columns: convert the names given by users, vendors and UR to RTDE's."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -23,7 +23,7 @@ SI = {
     "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "rad": 1.0, "deg": np.pi / 180.0, "m/s2": 1.0, "mm/s2": 1e-3,
     "g": 9.80665, "mg": 9.80665e-3, "rad/s": 1.0, "deg/s": np.pi / 180.0,
 }  # fmt: skip
-WIDEST = 7.0  # largest angle that the middle one of an arm's joints reaches [rad]; more must be degrees
+WIDEST = 7.0  # if half of an arm's joints exceed this angle, the unit must be degrees [rad]
 GRAVITY_IN_G = (0.8, 1.2)  # range of the median length of an accelerometer's vector in units of gravity
 
 TIMES = (TIME, "time", "t")
@@ -59,7 +59,7 @@ VENDORS = {
     "Doosan's RobotStateRt (brackets)": "time=time_stamp,q=actual_joint_position[{}]:deg,"
     "qd=actual_joint_velocity[{}]:deg/s,target_q=target_joint_position[{}]:deg,target_qd=target_joint_velocity[{}]:deg/s",
 }
-"""Columns of each program, in the form of `_given`; joint angles or an accelerometer identify it.
+"""Columns that each program writes, in the form of `_given`; its joint angles or accelerometer identify a program.
 
 Only names found in the source of a program that writes them are listed: xArm, Fanuc and others document what
 their controllers send, but no file with a header.
@@ -73,7 +73,7 @@ def rtde_names(
 ) -> tuple[list[str], dict[str, str], tuple[str, ...]]:
     """Return RTDE's names of a header's columns (empty for others), known units, and a note naming the vendor.
 
-    Without `columns`, those of `VENDORS` and `REALTIME` are recognised; other names stay.
+    If `columns` is None, names in `VENDORS` and `REALTIME` are recognised; other names stay.
     """
     if columns is not None:
         return *_given(path, columns, header), ()

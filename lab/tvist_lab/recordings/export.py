@@ -70,7 +70,7 @@ def _exact(values: Floats) -> bool:
 
 
 def _write_parquet(recording: Recording, stream: IO[bytes]) -> None:
-    table = io.BytesIO()  # from a stream that fails, polars makes an error that does not say why
+    table = io.BytesIO()  # if a stream fails, the error of polars would not say why
     flat(recording).write_parquet(table, metadata={KEY: describe(recording).decode()})
     stream.write(table.getbuffer())
 

@@ -14,8 +14,8 @@ from tvist_plant.description import DescriptionError, RobotDescription, load, ro
 from tvist_plant.user_file import UserFileError
 
 CORRELATED = 0.9  # smallest correlation between both signals [-]
-AS_WELL = 0.3  # share of the motion that a second fit must explain to make a join ambiguous [-]
-ALIKE = 3.0  # largest unexplained share of a second fit, relative to the best, to make a join ambiguous [-]
+AS_WELL = 0.3  # a second fit makes a join ambiguous if it explains this share of what the best explains [-]
+ALIKE = 3.0  # ... and leaves unexplained at most this multiple of what the best leaves [-]
 NOISE = 2e-3  # share of any fit that noise leaves unexplained [-]
 OFFSET, DRIFT = 2.5e-3, 2e-4  # largest half intervals of the offset [s] and of the drift [-]
 MOVED = {
@@ -77,7 +77,7 @@ def joined(
 
 
 def _robot(recording: Recording, robot: str | None) -> tuple[RobotDescription, list[str]]:
-    """Return the robot for the kinematics, and a note if nobody named it."""
+    """Return the robot for the kinematics, and a note if neither the log nor the user names a robot."""
     assumed = []
     if robot is None and recording.info is not None:
         robot = str(recording.info.model).lower()
@@ -93,7 +93,7 @@ def _robot(recording: Recording, robot: str | None) -> tuple[RobotDescription, l
 
 
 def _told(imu: Path, felt: BodyFrameSignal, sensor: Recording, *, force: bool) -> tuple[Clocks, float]:
-    """Return the relation of the clocks, and the gyroscope's unit in SI."""
+    """Return the relation of the clocks, and the factor that converts the gyroscope's readings to SI."""
     least, moved = MOVED[force]
     if (amount := float(felt.change.sum()) / RATE) < least:
         raise JoinError(f"{imu} cannot be joined: {moved.format(amount)}, which is too little: {REMEDY}")

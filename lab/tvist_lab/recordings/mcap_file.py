@@ -52,7 +52,7 @@ class RecordingFile:
     journal: tuple[Entry, ...]  # inputs of the controller
     recording: Recording  # states, truth and events as columns, with inputs and outputs if they were recorded
     from_tick: int | None
-    """First tick of a recording without the earlier ones; None if it started with the robot's first tick."""
+    """First tick of a recording that lacks earlier ticks; None if it starts with the robot's first tick."""
     complete: bool  # whether the file was closed properly and read to its end
     dropped: Mapping[str, int] | None  # dropped messages by kind; None if unknown
     note: str | None  # note if something is missing
@@ -88,7 +88,7 @@ class RecordingFile:
                                 channels[record.id] = readers[found["kind"]]
         except OSError as error:
             raise RecordingFileError(f"{error.filename} cannot be read: {error.strerror}") from error
-        except (*DAMAGE, ProtocolError):  # up to there it was read the first time
+        except (*DAMAGE, ProtocolError):  # the first reading stopped at the same damage
             pass
         if left > 0:
             raise RecordingFileError(f"{self.path} has changed since it was read: read it again")
@@ -128,7 +128,7 @@ class _Content:
     path: Path
     files: tuple[Path, ...]
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
-    ends: list[dict[str, str]] = field(default_factory=list)  # metadata at the end of each closed file
+    ends: list[dict[str, str]] = field(default_factory=list)  # metadata at the end of each complete file
     tables: dict[str, JsonColumns] = field(
         default_factory=lambda: {name: JsonColumns(kind) for name, kind in _TABLES.items()}
     )
@@ -198,7 +198,7 @@ class _Content:
                 self._open(record)
             case Metadata(name=name, metadata=content):
                 self._decode()
-                self.metadata.setdefault(name, content)  # that of the first segment counts
+                self.metadata.setdefault(name, content)  # take the value of the first segment
                 if name == END_METADATA:
                     self.ends.append(content)
                 if name == METADATA and content.get("format") != FORMAT:

@@ -89,7 +89,7 @@ class Recording:
 
     @property
     def origin(self) -> float:
-        """Time at which tables start [s]: the first row's if rows have the time of day, else 0."""
+        """Time that tables show as zero [s]: that of the first row if times are times of day, otherwise 0."""
         first = float(self.time[0]) if len(self.time) else 0.0
         return first if first > EPOCH else 0.0
 

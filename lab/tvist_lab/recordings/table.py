@@ -34,7 +34,7 @@ class Needs:
 
     columns: tuple[str, ...]  # vectors of which at least one must exist
     option: str  # option that gives the names of columns
-    positions: str  # option that gives their positions in a file without a header
+    positions: str  # option that gives the columns' positions in a file without a header
 
 
 ROBOT = Needs(("target_q", "actual_q"), "--columns time=…,q=joint_{}", "--columns time=1,q=2-7")
@@ -49,16 +49,16 @@ class LogTable:
     """Numbers of a log as stored in its file."""
 
     path: Path
-    names: Sequence[str]  # those of a vector end in `_0`, `_1`, …; empty without a header
+    names: Sequence[str]  # columns' names, for entries of vectors with `_0`, `_1`, …; empty without a header
     values: Floats  # shape (T, columns); NaN for an empty cell
     lines: Floats  # number of the line, row or packet of each row, shape (T,)
     unit: str = "row"  # what `lines` counts, for messages
     header: int = 0  # number of the line with the names; 0 if there is none
     notes: tuple[str, ...] = ()  # notes on what the reader of the file left out
     texts: Mapping[int, str] = field(default_factory=dict)
-    """Columns with text, by index, and the problem if they are needed."""
+    """Columns with text, by index, each with the error message in case the column is needed."""
     rtde: bool = False  # whether the format has RTDE's names and SI units by definition
-    there: str = ""  # what the file has instead of columns, for an error message
+    there: str = ""  # description of the file's content if it has no columns, for an error message
     description: Description | None = None
 
 

@@ -1,9 +1,9 @@
-"""Find offset and drift between the clocks of a robot and of a sensor at its flange, which saw the same motion.
+"""Find offset and drift between the clocks of a robot and of a sensor at its flange, from a motion that both measured.
 
-What a sensor at the flange would measure is computed from the logged joint angles. The axes of both may be rotated in
-any way. The motion is first located by its activity, which no rotation changes, at any offset and at drifts of up to
-2 %; then offset, drift, rotation (first by Wahba's problem with a singular value decomposition: Markley 1988), bias
-and lever are fitted together to the vectors.
+What a sensor at the flange would measure is computed from the logged joint angles; the real sensor's axes may be
+rotated in any way. The motion is first located by its magnitude, which no rotation changes, at any offset and with
+drifts of up to 2 %. Then offset, drift, rotation (at first from a singular value decomposition that solves Wahba's
+problem: Markley 1988), bias and lever are fitted together to the vectors.
 """
 
 from collections.abc import Iterator
@@ -25,11 +25,11 @@ SMOOTHING = {False: 0.02, True: 0.06}
 dominates the force at 10 Hz, while a gyroscope's bias wanders slowly."""
 GRAVITY = np.array([0.0, 0.0, 9.80665])
 AT_REST = 0.2  # share of a log in which the arm is assumed to rest [-]
-SPARSE = 10.0  # duration of a log relative to that of its rows from which it is mostly gaps [-]
+SPARSE = 10.0  # if a log lasts longer than its rows by this factor, it is refused as mostly gaps [-]
 HELD = 0.05  # longest time between two measurements of an arm that moves [s]
 DRIFT = 0.02  # largest drift in the search [-]
 COARSE = 5  # reduction of rows for the search: one of this number is used
-BLURRED = 0.2  # time by which a drift may be wrong between the ends of a log in the search [s]
+BLURRED = 0.2  # largest time error at the ends of a log due to the search's steps of drift [s]
 TRIED = 24  # number of candidates that are fitted
 APART = 0.25  # difference from which offsets are distinct [s]; the step of a fit is at most half of it
 BLOCK = 0.5  # time after which residuals of a fit count as independent [s]
@@ -44,7 +44,7 @@ TURN, BIAS, LEVER = slice(2, 5), slice(5, 8), slice(8, None)
 
 @dataclass(frozen=True)
 class BodyFrameSignal:
-    """A vector over time, in axes that move with it."""
+    """A vector over time, in the axes of the moving body."""
 
     time: Floats  # times on its own clock, spaced by 1/`RATE`, shape (T,) [s]
     vector: Floats  # angular velocity [rad/s] or specific force [m/s²], smoothed, shape (T, 3)
@@ -54,7 +54,7 @@ class BodyFrameSignal:
 
     @property
     def change(self) -> Floats:
-        """Activity beyond that at rest, in any axes: |ω|, or |df/dt| of a force, shape (T,)."""
+        """Magnitude of the motion beyond noise at rest, equal in any axes: |ω|, or |df/dt| of a force, shape (T,)."""
         force = self.lever.shape[2]
         felt = np.linalg.norm(np.gradient(self.vector, 1.0 / RATE, axis=0) if force else self.vector, axis=1)
         more: Floats = np.maximum(felt - np.quantile(felt, AT_REST), 0.0)
@@ -87,7 +87,7 @@ def at_flange(robot: RobotDescription, time: Floats, q: Floats, *, force: bool) 
 
 
 def _measured(time: Floats, q: Floats) -> tuple[Floats, Floats]:
-    """Drop rows that repeat the angles before, as in a log faster than its robot, since they are late."""
+    """Drop rows that only repeat angles, as in a log faster than its robot: these angles are out of date."""
     moves = np.append([True], np.any(np.diff(q, axis=0) != 0.0, axis=1))
     next_move = np.append(time[moves], [np.inf])[np.cumsum(moves)]
     last_move = time[moves][np.cumsum(moves) - 1]
@@ -96,7 +96,7 @@ def _measured(time: Floats, q: Floats) -> tuple[Floats, Floats]:
 
 
 def _resampled(time: Floats, values: Floats) -> tuple[Floats, Floats, Floats]:
-    """Resample rows at `RATE` or a multiple: return times, interpolated values, and 1, or 0 in a gap of the log."""
+    """Resample rows at `RATE` or a multiple: return times, interpolated values, and 0 for gaps of the log, else 1."""
     seen = np.isfinite(values).all(axis=1)
     time, values = time[seen], values[seen]
     if len(time) < 2 or not 1.0 < time[-1] - time[0] < SPARSE * len(time) * float(np.median(np.diff(time))):
@@ -134,7 +134,7 @@ class Clocks:
     half: tuple[float, float]  # half of the 95 % intervals of the offset [s] and the drift [-]
     correlation: float  # correlation of the vectors after rotation [-]
     scale: float  # size of the first vector relative to the other [-]
-    explained: float  # energy of the first vector's changes that the other explains
+    explained: float  # part of the energy of the first vector's changes that the other vector explains
     span: tuple[float, float]  # first and last common time, on the first clock [s]
 
     def first(self, other: Floats) -> Floats:
@@ -147,7 +147,7 @@ class Clocks:
 
 
 def fits(first: BodyFrameSignal, other: BodyFrameSignal) -> list[Clocks]:
-    """Return the possible alignments of two signals, that which explains most first."""
+    """Return the possible alignments of two signals; the alignment that explains most comes first."""
     found: list[Clocks] = []
     for start, drift in _places(first, other):
         clocks = _fitted(first, other, start, drift)
@@ -159,7 +159,7 @@ def fits(first: BodyFrameSignal, other: BodyFrameSignal) -> list[Clocks]:
 
 
 def _places(first: BodyFrameSignal, other: BodyFrameSignal) -> Iterator[tuple[float, float]]:
-    """Yield the other clock at the first row, and its drift, where both signals are active at once."""
+    """Yield candidates at which both signals move at the same times: other clock at the first row, and drift."""
     length, rows = first.time[-1] - first.time[0], COARSE / RATE
     moved, moved_there = first.change[::COARSE], other.change
     count = int(np.ceil(DRIFT * length / BLURRED))
@@ -179,7 +179,7 @@ def _places(first: BodyFrameSignal, other: BodyFrameSignal) -> Iterator[tuple[fl
 
 
 def _fitted(first: BodyFrameSignal, other: BodyFrameSignal, start: float, drift: float) -> Clocks | None:
-    """Fit everything from a starting point by Gauss-Newton; None if that leaves the common time."""
+    """Fit all parameters from a starting point by Gauss-Newton; None if the fit leaves the common time."""
     # Use the derivative of the first signal: joint angles have little ringing and noise.
     rate = np.gradient(first.vector, 1.0 / RATE, axis=0)
     t, rotation, weight = first.time - first.time[0], None, np.ones(len(first.time))
@@ -230,7 +230,7 @@ def closest_rotation(products: Floats) -> Floats:
 
 def _solved(X: Floats, y: Floats, weight: Floats) -> tuple[Floats, Floats]:
     """Solve weighted least squares; return parameters, and residuals of shape (T, 3)."""
-    # If everything turns about one axis, the rotation about it is not observable and stays.
+    # If all motion turns about one axis, the rotation about it is not observable and is not changed.
     G, g = (np.einsum("tik,t,ti...->k...", X, weight, one, optimize=True) for one in (X, y))
     p: Floats = _inverse(G, G) @ g
     return p, y - X @ p
@@ -245,9 +245,9 @@ def _inverse(G: Floats, whole: Floats) -> Floats:
 
 
 def _intervals(X: Floats, left: Floats, weight: Floats, since: Floats) -> tuple[float, float]:
-    """Return half the 95 % intervals of the offset, at its wider end, and of the drift.
+    """Return half the 95 % intervals of the offset, at the end of the log where it is wider, and of the drift.
 
-    Residuals are correlated in time, and few fast motions have most weight: the fit is repeated, to first order,
+    Since residuals are correlated in time and few fast motions have most weight, the fit is repeated, to first order,
     without each block of `BLOCK` (the jackknife of Tukey 1958, with Student's quantile for the blocks with motion).
     """
     first = np.unique(np.searchsorted(since, np.arange(since[0], since[-1], BLOCK)))

@@ -34,7 +34,7 @@ CHANGES = {
     "vibration\nRV": "residual_vibration", "peak": "peak", "at rest": "still_after", "settling\nt_stb": "stabilisation",
     "cycle\nt_cycle": "cycle", "overshoot\ne_os": "overshoot",
 }  # fmt: skip
-"""Columns of the table that compares two files, and the changes that they show."""
+"""Columns of the table that compares two files, and the change that each column shows."""
 OF_PAIRS = {
     "without": "Largest acceleration of the tool after the unshaped motion, later than 10 ms after its stop.",
     "with": "The same after the shaped motion.",
@@ -165,7 +165,7 @@ def _panels(files: Sequence[_File], comparisons: Sequence[Comparison]) -> list[C
 
 
 def _pictures(files: Sequence[_File], panels: Sequence[ComparedPanel]) -> Iterator[Picture]:
-    """Yield one picture of the first motions, on one scale, and one of each file's loudest ring-down."""
+    """Yield one picture of the first motions, on one scale, and one of the strongest ring-down of each file."""
     plain = [file.name for file in files if shaping_of(file.measured.results, file.name).shaped is False]
     unshaped = [WITHOUT, *map(literal, plain)]
     with suppress(NotMeasurableError):

@@ -25,7 +25,7 @@ class Shaping:
 
 
 def shaping_of(results: Sequence[MotionResult], name: str) -> Shaping:
-    """Judge by the time by which the target ends later than its reference."""
+    """Judge whether the reference was shaped, by how much later the target ends than the reference."""
     delays = [result.delay_ms for result in results if result.delay_ms is not None]
     if not delays:
         return Shaping(None, f"Whether {name} was shaped does not show: it has no reference before shaping.")

@@ -30,7 +30,7 @@ from tvist_plant.description import RobotDescription
 from tvist_plant.variants import HEAVIER, Variant, rubbed
 
 STICKS = "ur5e_stiction"
-"""Robot file of the arms with sticking motors; with its own calibration, it is all that their controller knows."""
+"""Robot file of the arms with sticking motors; their controller knows only this file and its calibration."""
 STICKING = (
     Variant("stiction", "motors that stick near standstill, as the controller knows"),
     Variant("more_stiction", "motors that stick more than the controller knows", partial(rubbed, HEAVIER)),
@@ -42,7 +42,7 @@ ONCE = pl.col("arm") == pl.col("arm").first()  # the reference is the same for a
 
 
 def _time(of: float, called: str) -> pl.Expr:
-    found = pl.col("time_ms").quantile(of, "higher").round(6)  # equal times are ranked by what rings
+    found = pl.col("time_ms").quantile(of, "higher").round(6)  # equal times are ranked by vibration left
     return pl.when(found.is_finite()).then(found).alias(f"time_until_still_ms_{called}")
 
 
@@ -74,7 +74,7 @@ MORE = (
 
 
 def study(asked: StudyRequest) -> Study:
-    """Return the study: methods, moves and payload errors; if quick, one error in turn for each move."""
+    """Return the study: methods, moves and payload errors; if quick, each move has one of the errors, in turn."""
     # Only the user's own shapers are inspected here; tests cover those of the package.
     theirs = [
         one
@@ -112,7 +112,7 @@ def study(asked: StudyRequest) -> Study:
 
 
 def _beside_waiting(rows: pl.DataFrame) -> pl.DataFrame:
-    """Add to each row the results of waiting with the same move on the same arm."""
+    """Add values to each row that compare it with the unshaped method for the same move on the same arm."""
 
     def waited(name: str) -> pl.Expr:
         return pl.col(name).filter(pl.col("shaper") == UNSHAPED).first().over("move", "payload_error", "arm")
@@ -126,9 +126,9 @@ def _beside_waiting(rows: pl.DataFrame) -> pl.DataFrame:
 
 
 def _cases(asked: StudyRequest, methods: Sequence[Method], arms: Sequence[Variant]) -> list[Case]:
-    """Return the cases of one controller."""
-    # If the calibration contains friction, it is fed forward to all methods of a case; methods without a
-    # calibration therefore have separate cases.
+    """Return the cases of arms whose controllers have the same robot file."""
+    # If the calibration contains friction, it is fed forward for all methods of a case. Methods without a
+    # calibration therefore need separate cases.
     parts = [tuple(one for one in methods if hasattr(one, "recipe") is has) for has in (True, False)]
     return [
         Case(
@@ -148,7 +148,7 @@ def ranked(values: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def _rank(result: Result, asked: StudyRequest, faults: Mapping[str, str]) -> None:
-    """Order the summary by settling time; those that cannot be ranked come last."""
+    """Order the summary by settling time; methods that cannot be ranked come last."""
     values, labels = result.values, {one.name: one for one in asked.methods}
     values["methods"] = described(labels.values())
     values["arms"] = {arm.name: arm.label for case in result.study.cases for arm in case.arms}
@@ -194,13 +194,13 @@ def _rank(result: Result, asked: StudyRequest, faults: Mapping[str, str]) -> Non
 
 
 def _place(entry: Mapping[str, Any]) -> tuple[float, float]:
-    """Return the sort key: settling, then residual; a method that never settles comes last."""
+    """Return the sort key of a method: settling time, infinite if it does not settle, then residual vibration."""
     still = entry["time_until_still_ms_median"]
     return (math.inf if still is None else still, entry["residual_m_s2_median"])
 
 
 def _beats(other: Mapping[str, Any], entry: Mapping[str, Any]) -> bool:
-    """Whether another method is better in settling or residual, and worse in neither."""
+    """Whether another method is better in settling time or residual vibration, and worse in neither."""
     ours, theirs = _place(entry), _place(other)
     return theirs != ours and theirs[0] <= ours[0] and theirs[1] <= ours[1]
 

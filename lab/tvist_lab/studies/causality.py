@@ -13,8 +13,8 @@ from tvist_lab.study.shaping import ShaperFaultError
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
 
-PLACES = (0.15, 0.5, 0.8)  # positions from which the references differ, as shares of the motion [-]
-ELSEWHERE = 1.0  # acceleration with which the other reference deviates [rad/s²]
+PLACES = (0.15, 0.5, 0.8)  # times from which a second reference deviates, as shares of the motion [-]
+ELSEWHERE = 1.0  # acceleration with which the second reference deviates [rad/s²]
 TWICE = "gives another output when the same reference is run again: it keeps state or uses random numbers"
 
 
@@ -29,10 +29,10 @@ def inspect(method: Method, description: RobotDescription, moves: Sequence[Move]
 
 
 def check_causal(method: Method, task: Task) -> None:
-    """Run a shaper on a reference, on others with the same start, and on the first again.
+    """Run a shaper on a reference, on others that are equal up to some tick, and on the first again.
 
-    Raises ShaperFaultError if outputs depend on the future, or on earlier runs. A method that gets a move's target in
-    advance gets the same one with every reference: it may know the end, but no more of the way than others.
+    Raises ShaperFaultError if outputs depend on the future, or on earlier runs. If a method gets a move's target in
+    advance, it gets the same target with every reference: it may use the target, but not the way to it.
     """
     if not isinstance(method, SampleMethod):
         return  # it plans the motion, whose end it may know

@@ -1,9 +1,9 @@
 """`tvist study match`: compare two shapers on the same moves and plants, and test the difference.
 
-Both make each move on each plant, so the difference does not depend on how hard a move is. The interval of
+Both shapers make each move on each plant, so the difference does not depend on how hard a move is. The interval of
 the median difference is exact for any distribution: its ends are where a sign test at 5 % starts to reject.
-The interval of the 5th percentiles' difference is a percentile bootstrap over pairs, too narrow with so few
-moves in the tail; it is shown but not used for a verdict.
+The interval of the 5th percentiles' difference is a percentile bootstrap over pairs. With few moves in the tail,
+this interval is too narrow; it is shown but not used for a verdict.
 """
 
 from collections.abc import Sequence
@@ -66,7 +66,7 @@ def study(asked: StudyRequest) -> Study:
 
 
 def _paired(rows: pl.DataFrame, names: Sequence[str]) -> pl.DataFrame:
-    """Put the results of both for a move side by side, in the row of the first."""
+    """Put the results of both shapers for a move on an arm into the first shaper's row; drop the other row."""
     columns = {
         f"{word}_{short}": pl.col(measure).filter(pl.col("shaper") == name).first().over("arm", "move")
         for name, word in zip(names, ("first", "second"), strict=True)
@@ -91,12 +91,12 @@ def _exact(differences: Floats) -> list[float] | None:
 def exact_interval(differences: Floats) -> list[float]:
     """Return the interval that contains a distribution's median with at least 95 % probability, whatever its form."""
     ordered = np.sort(differences)
-    outside = int(binom.ppf(0.025, len(ordered), 0.5))  # P(fewer lie below the median) is less than 2.5 %
+    outside = int(binom.ppf(0.025, len(ordered), 0.5))  # P(fewer are below the median) is less than 2.5 %
     return [float(ordered[outside - 1]), float(ordered[len(ordered) - outside])]
 
 
 def verdict(differences: Floats, first: str, second: str) -> str:
-    """Return the verdict of the exact interval of the median difference, first minus second."""
+    """Return which shaper is better, by the exact interval of the median of first minus second."""
     found = _exact(differences)
     if found is None:
         return TOO_FEW

@@ -69,7 +69,7 @@ def study(asked: StudyRequest) -> Study:
     """Return the study of these moves by these shapers, waiting, and the baselines."""
     moves = asked.feasible()
     named, others = asked.methods[: asked.named], asked.methods[asked.named :]
-    if asked.streams:  # the end of a stream is not known
+    if asked.streams:  # a shaper does not know the end of a stream
         others = [one for one in others if not one.told_target]
     weak, notes = len(asked.moves) - len(moves), list(asked.notes)
     if weak:
@@ -163,7 +163,7 @@ def _draw(result: Result) -> Figures:
 
 
 def example(moves: Sequence[Mapping[str, Any]]) -> int:
-    """Return the index of the move to draw: the median by unshaped vibration, of those that count if any do."""
+    """Return the index of the move to draw: with median unshaped vibration, if possible among moves that count."""
     counted = [place for place, move in enumerate(moves) if move["reduction_percent"] is not None]
     counted = counted or list(range(len(moves)))
     return sorted(counted, key=lambda place: float(moves[place]["unshaped_peak_m_s2"]))[len(counted) // 2]

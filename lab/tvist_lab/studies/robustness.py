@@ -27,12 +27,12 @@ WORST = Column("p5", p5("reduction_percent", MIN_MOVES), 1)
 BOTH = Column("median / p5", lambda one: f"{LESS.text(one)} / {WORST.text(one)}")
 DELAY = Column("delay ms", median("delay_ms"), 0)
 BEYOND = reduction_percent(pl.col("waited_peak_m_s2"), pl.col("shaped_peak_m_s2"))
-"""Reduction compared with waiting."""
+"""Reduction compared with an unshaped motion, after the time at which the shaped motion stops [%]."""
 WAITED = pl.col("reduction_percent").is_not_null() & (pl.col("waited_peak_m_s2") >= QUIET_LEVEL)
 
 
 def study(asked: StudyRequest) -> Study:
-    """Return the study: payload errors and moves, each by all shapers on all arms with that error."""
+    """Return the study: a case for each payload error and move, by all shapers on all arms with this error."""
     wrong = errors(asked.arms)
     arms: dict[float, dict[str, Variant]] = {}
     for kind in wrong.values():
@@ -72,7 +72,7 @@ def study(asked: StudyRequest) -> Study:
 
 
 def errors(named: Sequence[Variant] = ()) -> dict[str, dict[str, tuple[Variant, float]]]:
-    """Return the columns of each kind of table by title: the arm, and the error of the declared mass [-]."""
+    """Return for each kind of error the tables' columns: by title, the arm and the declared mass's error [-]."""
     return {
         "stiffness": {f"{100.0 * one:+.0f} %": (with_springs(1.0 + one), 0.0) for one in ERRORS["stiffness"]},
         "payload": {f"{100.0 * one:+.0f} %": (AS_DESCRIBED, one) for one in ERRORS["payload"]},
@@ -81,7 +81,7 @@ def errors(named: Sequence[Variant] = ()) -> dict[str, dict[str, tuple[Variant, 
 
 
 def cells(values: Mapping[str, Any]) -> dict[str, list[dict[str, Any]]]:
-    """Return the entries of each kind of table, by shaper in the order of the summary, with the column's title."""
+    """Return for each kind of error the tables' entries, in the summary's order, with the column's title added."""
     found = {(one["shaper"], one["arm"], one["payload_error"]): one for one in values["cells"]}
     delays = {one["shaper"]: one["delay_ms_median"] for one in values["summary"]}
     known = {arm for one in errors().values() for arm, _ in one.values()}
@@ -101,7 +101,7 @@ def cells(values: Mapping[str, Any]) -> dict[str, list[dict[str, Any]]]:
 
 
 def tables(values: Mapping[str, Any], kind: str, shown: Sequence[Column]) -> list[ResultTable]:
-    """Return tables of one kind with a column for each error."""
+    """Return the tables for one kind of error, with a column for each error."""
     title = "Plants by name" if kind == PLANT else f"Wrong {kind}"
     found = [across(cells(values)[kind], "shaper", "error", one, [DELAY]) for one in shown]
     return [ResultTable(f"{title}: {one.title}", one.entries, one.columns) for one in found]

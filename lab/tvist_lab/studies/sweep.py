@@ -54,7 +54,7 @@ class Mistakes(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, om
 
 
 class NamedRobot(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
-    """A robot with a calibration other than its own."""
+    """A robot with the calibration of another."""
 
     robot: Name  # name of a robot that comes with the package, or path of a robot file
     calibration: Name  # name of a calibration that comes with the package, or path of a calibration file
@@ -134,11 +134,11 @@ def _line(text: str, where: str) -> str:
 
 @dataclass(frozen=True)
 class SweptRobot:
-    """A robot with the recipes of its shapers."""
+    """A robot, and the recipes for creating its shapers."""
 
     name: str
     description: RobotDescription
-    """The arm with the sweep's disturbances, which is also the controller's model of it."""
+    """The arm with the sweep's disturbances; also the controller's model of the arm."""
     recipes: tuple[Recipe, ...]  # recipe of each shaper of the sweep, without errors
 
 
@@ -152,7 +152,7 @@ class Axes(Sequence[Case]):
 
     def __init__(self, spec: Spec, robots: Sequence[SweptRobot]) -> None:
         self.spec, self.robots = spec, tuple(robots)
-        # Moves do not depend on the payload axis: they are those of `tvist study moves` with this seed.
+        # Moves do not depend on the axis `payloads`: they equal those of `tvist study moves` with this seed.
         self._moves = [
             draw_moves(
                 arm, spec.moves, spec.seed, (0.0, arm.limits.payload), wrists=spec.wrists, stroke=spec.stroke
@@ -218,7 +218,7 @@ def study(spec: Spec, robots: Sequence[SweptRobot]) -> Study:
 
 
 def digest(content: object) -> str:
-    """Return a short digest of a robot, a calibration or moves, by which a change is noticed."""
+    """Return a short digest of a robot, a calibration or moves, which shows whether they have changed."""
     return sha256(msgspec.json.encode(content, order="sorted")).hexdigest()[:16]
 
 

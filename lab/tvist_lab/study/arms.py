@@ -1,4 +1,4 @@
-"""The arms of studies: those of `tvist_plant.variants`, and the same in MuJoCo."""
+"""The arms of studies: those of `tvist_plant.variants`, and variants that MuJoCo simulates."""
 
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.plant import SimulatedArm

@@ -19,7 +19,7 @@ LIMITS = {"gentle": PAPER, "industrial": MotionLimits(velocity=3.0, acceleration
 
 
 def arm_seed(seed: int, place: int) -> int:
-    """Return the seed of gear errors for the move at a place, different for each move."""
+    """Return the seed of gear errors for the move with an index; each move has another seed."""
     return (1_000_003 * seed + place) % 2**63
 
 
@@ -34,14 +34,14 @@ class Case:
     limits: MotionLimits = PAPER  # limits of every joint
     payload_error: float = 0.0  # error of the declared mass, relative to the carried one [-]
     stream: bool = False
-    """Whether to follow a stream from the move's start that is stopped somewhere, instead of making the move."""
+    """Whether, instead of making the move, to follow a stream that begins at the move's start and is stopped."""
     methods: tuple[Method, ...] = ()  # methods for this case; empty for those of its study
     axes: Mapping[str, Any] = field(default_factory=dict)
-    """Cells of its rows by column name, which distinguish it from the other cases of its study."""
+    """Cells in the case's rows, by column name, that distinguish the case from others of the study."""
 
     @property
     def declared(self) -> Move:
-        """The move as the controller knows it."""
+        """The move with the declared mass, which the controller knows, instead of the carried one."""
         return Move(self.move.start, self.move.target, self.move.mass * (1.0 + self.payload_error))
 
     @property

@@ -86,8 +86,8 @@ def some(
     """Return methods by name, or from files: paths with a class that has `step`, or loaded shapers.
 
     `calibration` provides the estimates; `masses` are the smallest and largest payload [kg], by default 0 and the
-    rating; `modes` is the number that shapers of the library suppress; `frequency_error` the share by which every
-    frequency is too high [-]. Raises StudyError if a name is unknown, DesignError if it has an unknown parameter.
+    rating; `modes` is the number of modes that shapers of the library suppress; `frequency_error` is the share by
+    which every frequency is too high [-]. Raises StudyError for unknown names, DesignError for unknown parameters.
     """
     recipe = Recipe("zv", calibration, frequency_error, modes)
     found: dict[str, Method] = {}

@@ -1,4 +1,4 @@
-"""Columns of tables, alike on a terminal, on a page and in Markdown, and the values that studies compute for them."""
+"""Columns of tables on terminals, web pages and in Markdown, and the values that studies compute for columns."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -17,13 +17,13 @@ class Column:
 
     title: str  # heading; a second line is small on a web page
     of: str | pl.Expr | Callable[[Entry], Any]
-    """Where an entry holds the value, such as "delay_ms" or "less.p5"; a function of the entry; or an
-    expression that computes it for a group of rows and is stored in the entry under its output name."""
+    """Key of the value in an entry, such as "delay_ms" or "less.p5"; or a function of the entry; or an expression
+    that computes the value for a group of rows, which is stored in the entry under the expression's output name."""
     digits: int | None = None  # number of decimals; None for text
     meaning: str = ""  # meaning of the heading's first line
 
     def text(self, entry: Entry) -> str:
-        """Return a cell; a dash means not measurable."""
+        """Return the text of an entry's cell; a dash means not measurable."""
         value: Any = entry
         if isinstance(self.of, pl.Expr):
             value = entry[self.of.meta.output_name()]
@@ -81,9 +81,9 @@ def across(
 
 
 def share(name: str, of: float, called: str, least: int = 0, among: pl.Expr | None = None) -> pl.Expr:
-    """Return an expression for the percentile `of` (a share) of a measure, over the rows that have it.
+    """Return an expression for a quantile of a measure over the rows that have this measure.
 
-    `called` is its suffix; fewer than `least` rows give null; `among` selects rows.
+    `of` is its share [-], `called` its suffix; fewer than `least` rows give null; `among` selects rows.
     """
     column = pl.col(name) if among is None else pl.col(name).filter(among)
     return pl.when(column.count() >= least).then(column.quantile(of, "linear")).alias(f"{name}_{called}")
@@ -115,7 +115,7 @@ def highest(name: str) -> pl.Expr:
 
 
 def of_group(function: Callable[..., Any], columns: Sequence[pl.Expr], kind: Any, called: str) -> pl.Expr:
-    """Return an expression that calls a function with a group's values of columns, without null rows.
+    """Return an expression that calls a function with a group's values in some columns, without rows with null.
 
     The function gets one array per column, of equal length, and returns a value of type `kind`, or None;
     `called` names it.

@@ -1,4 +1,4 @@
-"""Run what is missing of a study, and keep rows as they come."""
+"""Run the missing jobs of a study, and store rows while jobs finish."""
 
 import tempfile
 from collections.abc import Callable, Sequence
@@ -15,10 +15,10 @@ from tvist_lab.study.study import Study
 from tvist_lab.study.work import FAILED, Row, failed, measure_each, why
 
 PART = 32  # number of jobs in a part, and the most that are lost if the program is killed
-FEW_MOTIONS = 16  # largest number of motions that do not justify another process
+FEW_MOTIONS = 16  # largest number of motions that are made in this process
 
 Progress = Callable[[int], AbstractContextManager[Callable[[int], None]]]
-"""Takes the number of jobs to run; counts finished ones."""
+"""Function of the number of jobs to run; its block yields a function that counts finished jobs."""
 
 
 @dataclass
@@ -38,7 +38,7 @@ def run(
 ) -> StudyRun:
     """Run missing and failed jobs, and write all rows to `folder`, if given.
 
-    `executor` starts what runs the jobs, by default processes of this machine if there are enough jobs. Raises
+    `executor` starts an executor for the jobs, by default processes of this machine if there are enough jobs. Raises
     StoreError if the folder is in use, unwritable, or of another study; OSError if the executor cannot run.
     """
     with ExitStack() as stack:
@@ -67,7 +67,7 @@ def _run(
             kept += [{"case": place, **row} for row in outcome]
             pending += 1
             if pending == PART:
-                part, kept, pending = kept, [], 0  # what cannot be written is not tried again below
+                part, kept, pending = kept, [], 0  # do not try below to write the same rows again
                 store.keep(study.frame(part))
             advance(1)
     finally:

@@ -32,11 +32,11 @@ from tvist_plant.model import FLANGE, rigid_model
 from tvist_plant.plant import PERIOD
 
 WORTH = 0.2  # unshaped peak [m/s²] below which a move is listed, but not counted in percentages
-QUIET_LEVEL = 0.02  # a lower threshold for an arm at rest [m/s²]
+QUIET_LEVEL = 0.02  # |α| below which an arm counts as at rest, by a stricter measure than `STILL` [m/s²]
 
 
 class MadeMotion:
-    """A motion of an arm, with the same motion unshaped."""
+    """A motion that an arm has made, with the unshaped motion to compare it with."""
 
     def __init__(
         self,
@@ -73,7 +73,7 @@ class MadeMotion:
 
     @cached_property
     def waited(self) -> float:
-        """Largest true |α| of the unshaped motion later than 10 ms after this one's stop [m/s²]."""
+        """Largest true |α| of the unshaped motion, at times later than 10 ms after this motion's stop [m/s²]."""
         waiting = self.unshaped
         stop = self.recording.time[self.rows.shaped_stop] + AFTER_STOP
         return peak_later_than(waiting.recording, waiting.rows, min(stop, waiting.recording.time[-2]))
@@ -89,7 +89,7 @@ class MadeMotion:
         return self.rows.shaped_duration(self.recording)
 
     def still(self, threshold: float = STILL) -> float | None:
-        """Return the settling time from the start of the unshaped reference [s]; None if it does not settle in time."""
+        """Return the settling time from the start of the unshaped reference [s]; None if the arm does not settle."""
         try:
             return still_after(self.recording, self.rows, threshold)
         except NotMeasurableError:
@@ -119,7 +119,7 @@ class Measure:
 
 
 def _late(at: float | None, motion: MadeMotion) -> float | None:
-    """Return the time after the unshaped reference's stop, since the lengths of moves differ [ms]."""
+    """Convert a time [s] to the time after the unshaped reference's stop [ms], since moves have various lengths."""
     return None if at is None else round(1e3 * (at - motion.unshaped.duration), 6)
 
 

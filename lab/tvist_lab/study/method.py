@@ -1,4 +1,4 @@
-"""Methods: what shapes, plans or replaces a motion, each with a name in JSON and a label for display."""
+"""Methods, which shape, plan or replace a motion; each has a name in JSON and a label for display."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
@@ -30,21 +30,21 @@ class Task:
     reference: Floats  # reference, shape (T, n) [rad]
     limits: MotionLimits = PAPER
     as_served: bool = False
-    """Whether to plan moves for the filter and accept the result, as a robot does; otherwise the filter gets
-    the reference itself, and is checked for tails."""
+    """Whether to plan moves for the filter and accept the result, as a robot does. Otherwise the filter gets the
+    reference itself, and its output is checked for motion after the declared end."""
     stream: bool = False  # whether the reference is a stream with unknown end
     ticks: int | None = None  # duration of the motion to compare with, if any
 
 
 class Method(ABC):
-    """A way to make a motion; it can be sent to another process."""
+    """A way to make a motion; a method can be sent to another process."""
 
     name: str
     label: str  # name for display
 
     @property
     def told_target(self) -> bool:
-        """Whether it needs a motion's end in advance, and therefore cannot shape a stream."""
+        """Whether the method needs a motion's end in advance, and therefore cannot shape a stream."""
         return False
 
     @abstractmethod
@@ -53,7 +53,7 @@ class Method(ABC):
 
 
 class WaitingMethod(Method):
-    """The unshaped motion, as a robot makes that only waits."""
+    """The unshaped motion, as made by a robot that only waits for vibration to decay."""
 
     name, label = "waiting", "waiting, unshaped"
 
@@ -85,7 +85,7 @@ class Named(SampleMethod):
     recipe: Recipe
     name: str
     label: str = ""
-    alone: bool = False  # whether to omit the elastic feed-forward for which the filter is made
+    alone: bool = False  # whether to omit the elastic feed-forward that the filter needs
 
     @property
     def told_target(self) -> bool:
@@ -97,14 +97,14 @@ class Named(SampleMethod):
         return _from_rest(self.recipe.make(task.description, task.move.mass), task)
 
     def driven(self, found: Shaped, task: Task) -> Shaped:
-        """Add the feed-forward that the filter needs, and the friction fed forward with it."""
+        """Add the elastic feed-forward that the filter needs, and the friction to feed forward."""
         description = task.description
         tvist = self.recipe.make(description, task.move.mass)
         elastic = None if self.alone else self.recipe.elastic(description, tvist)
         return replace(found, elastic=elastic, law=self.recipe.friction(description, tvist))
 
     def shaped(self, task: Task) -> Shaped:
-        """Shape the reference, or a motion planned for the filter as by a robot."""
+        """Shape the reference; if the task is `as_served`, shape a motion planned for the filter, as a robot does."""
         if task.stream or not task.as_served:
             return super().shaped(task)
         tvist, own = own_move(self.recipe, task.description, task.move, task.limits)
@@ -119,18 +119,18 @@ class ConstantModes(SampleMethod):
     name: str
     label: str
     shaper: str
-    modes: int = 1  # number of lowest modes at the move's target, each with its own shaper
+    modes: int = 1  # number of lowest modes at the move's target; each has a shaper
     f_d: float | None = None  # design frequency [Hz]; None for the estimate
     zeta: float | None = None  # design damping ratio [-]; None for the estimate
-    for_payload: bool = False  # whether it is designed for the declared payload
+    for_payload: bool = False  # whether the shaper is designed for the declared payload
 
     @property
     def told_target(self) -> bool:
-        """Whether it is designed for the end of each move."""
+        """Whether the shaper is designed for the end of each move."""
         return self.f_d is None and not self.for_payload
 
     def stepper(self, task: Task) -> RunningFilter:
-        """Return the fixed filter, reset; it knows the target if it is designed for it."""
+        """Return the fixed filter, reset; if it is designed for the target, it is told the target."""
         made, description, mass = shaper(self.shaper), task.description, task.move.mass
         designed = (self.f_d, self.zeta)
         if self.for_payload:
@@ -166,7 +166,7 @@ class ConstantMeanDelay(SampleMethod):
 
 
 class Planned(Method):
-    """A method that plans the motion, but no stream or curved path, and shapes no reference."""
+    """A method that plans a motion instead of shaping a reference; it cannot make streams or curved paths."""
 
     told_target = True
 
@@ -177,7 +177,7 @@ class StretchedDoubleS(Planned):
 
     name: str
     label: str
-    like: Method | None = None  # method whose duration it has; None for the task's own
+    like: Method | None = None  # method whose motion has the same duration; None to take that of the task
 
     def shaped(self, task: Task) -> Shaped:
         """Return a double S with less jerk."""
@@ -194,14 +194,14 @@ class StretchedDoubleS(Planned):
 
 @dataclass(frozen=True)
 class PeriodOfJerk(Planned):
-    """A double S whose jerk lasts a period of the lowest mode at the target, which is then not excited."""
+    """A double S whose jerk lasts a period of the lowest mode at the target, so that this mode is not excited."""
 
     recipe: Recipe
     name: str
     label: str
 
     def shaped(self, task: Task) -> Shaped:
-        """Return a double S with that jerk."""
+        """Return a double S with this duration of jerk."""
         start, target = np.array(task.move.start), np.array(task.move.target)
         f_d = float(self.recipe.estimator(task.description, task.move.mass, 1).estimate(target)[0][0])
         limits = replace(task.limits, jerk=task.limits.acceleration * f_d)
@@ -209,7 +209,7 @@ class PeriodOfJerk(Planned):
 
 
 def _from_rest(tvist: Filter, task: Task) -> RunningFilter:
-    """Return a filter at rest at the start of a move, given the target as by a robot."""
+    """Return a filter at rest at the start of a move; like a robot, tell it the target unless it is a stream."""
     tvist.reset(np.array(task.move.start))
     tvist.aim(None if task.stream else np.array(task.move.target))
     return RunningFilter(tvist)

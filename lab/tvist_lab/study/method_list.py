@@ -11,7 +11,7 @@ Kind = Literal[
     "filter", "for target", "for payload", "for workspace", "held", "longer", "as long as", "jerk of a period",
     "shaped alone",
 ]  # fmt: skip
-UNSHAPED = "none"  # name of waiting on the bench, where it passes through the same line as the others
+UNSHAPED = "none"  # name of the unshaped motion on the bench, made by the same control line as all others
 
 
 @dataclass(frozen=True)
@@ -22,11 +22,11 @@ class ListedMethod:
     label: str  # name for display
     sets: tuple[MethodSet, ...] = ()
     kind: Kind = "filter"
-    of: str = ""  # shaper from which it is made, or method whose duration it has; empty for its own name
+    of: str = ""  # name of its shaper, or of the method with the same duration; empty if equal to `name`
     modes: int = 1  # number of modes; more than one needs a modal calibration
 
 
-UNLISTED: tuple[MethodSet, ...] = ("bench", "lesson")  # sets of a shaper of the library that is not listed
+UNLISTED: tuple[MethodSet, ...] = ("bench", "lesson")  # sets of library shapers that are not listed
 METHODS = (
     ListedMethod("equal_duration_double_s", "longer double S", ("baselines",), "longer"),
     ListedMethod("double_s_of_one_period", "double S whose jerk lasts a period", ("baselines",), "jerk of a period"),
@@ -63,7 +63,7 @@ METHODS = (
     ListedMethod("elastic-auto", "auto, smoothing, elastic feed-forward", ("bench", "robustness")),
     ListedMethod("product", "constant mean delay, product of three ZV", ("bench",), "held", modes=3),
     ListedMethod(UNSHAPED, "waiting, unshaped"),
-    # Variants of the shapers above, which need no set.
+    # Variants of the shapers above; they are in no set.
     *(ListedMethod(name, f"TVIST-{name.upper()}, lowest mode")
       for name in ("um_zv", "um_zvd", "ei_exact", "si", "zvdd", "ei2_exact", "zvddd", "ei3_exact")),
 )  # fmt: skip

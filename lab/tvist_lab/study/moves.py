@@ -132,7 +132,7 @@ def draw_moves(
 def stopped_stream(
     description: RobotDescription, start: Floats, seed: int, limits: MotionLimits = PAPER
 ) -> Floats:
-    """Draw a stream that uses its limits fully and is stopped before its last target, shape (T, n) [rad]."""
+    """Draw a stream at its limits that is stopped before it reaches its last target, shape (T, n) [rad]."""
     joints, random = len(start), np.random.default_rng([seed, 71])
     region = workspace(description)
     used = min(len(region.low), joints)
@@ -224,7 +224,7 @@ def _check(number: int, move: Move, description: RobotDescription) -> None:
 
 
 def _in_words(why: str) -> str:
-    """Convert the position in an error to words: `[2].start[1]` is move 3, start, joint 2."""
+    """Convert the position in an error message to words: `[2].start[1]` becomes move 3, start, joint 2."""
     words = re.sub(r"^\[(\d+)\]\.?", lambda found: f"move {int(found[1]) + 1}, ", why)
     words = re.sub(
         r"^(move \d+, \w+)\[(\d+)\]", lambda found: f"{found[1]}, joint {int(found[2]) + 1}", words

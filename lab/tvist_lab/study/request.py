@@ -1,4 +1,4 @@
-"""The content of a requested study: a robot, moves and shapers."""
+"""Input of a study that a user requests: a robot, moves and shapers."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -21,7 +21,7 @@ class StudyRequest:
 
     description: RobotDescription  # the arm, which is also the controller's model of it
     moves: Sequence[Move]
-    methods: Sequence[Method]  # those of every study, named shapers, baselines
+    methods: Sequence[Method]  # methods of every study, then named shapers, then baselines
     named: int = 0  # number of methods before the baselines
     arms: Sequence[Variant] = ()  # the named plants
     seed: int = 0  # seed of gear errors and deviations
@@ -29,10 +29,10 @@ class StudyRequest:
     payload_error: float = 0.0  # error of the declared mass, relative to the carried one [-]
     streams: bool = False  # whether to follow streams from the start of each move
     quick: bool = False  # whether a few motions are enough
-    facts: Mapping[str, Any] = field(default_factory=dict)  # description of all this for --json
+    facts: Mapping[str, Any] = field(default_factory=dict)  # description of the request for --json
     notes: Sequence[str] = ()  # notes on the moves for the reader
     on: "Callable[[str], StudyRequest | None]" = lambda _: None
-    """Returns the same for another robot that comes with the package; None if the user chose a robot."""
+    """Returns the same request for another robot of the package; None if the user chose a robot."""
 
     def feasible(self) -> list[Move]:
         """Return the moves for which the drives are strong enough."""
@@ -65,6 +65,6 @@ class Preset:
     always: tuple[str, ...] = ()
     shapers: tuple[str, ...] = ()  # default shapers
     defaults: MethodSet | None = None  # methods that are compared with the shapers; None if there are none
-    options: frozenset[str] = frozenset()  # options that it has besides those of all presets
+    options: frozenset[str] = frozenset()  # options of this preset besides those of all presets
     modal: bool = True  # whether each calibration needs a modal model
     least: int = 1

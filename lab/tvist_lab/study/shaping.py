@@ -14,8 +14,8 @@ from tvist_shaping.base import Filter
 LONGEST = 3.0  # time after the reference's end within which a shaped reference must end [s]
 ENDED = 10  # number of ticks at the target after which the output has ended
 WATCHED = 0.5  # time for which the output is checked for a tail after it has ended [s]
-TAIL = 1e-6  # largest motion in that time, and largest distance from the target [rad]
-SLACK = 3  # ticks of an end later than declared, due to interpolation
+TAIL = 1e-6  # largest distance from the target or the final sample that does not count as a tail [rad]
+SLACK = 3  # ticks by which the end may be later than declared, due to interpolation
 WARM = 20  # number of first ticks whose processing time is ignored, since they may compile code
 
 
@@ -33,7 +33,7 @@ class Shaped:
     elastic: ElasticFeedForward | None = None
     """Elastic feed-forward for the drives; None for that of the paper's controller."""
     law: Floats | None = None  # friction to feed forward; None for that of the unshaped motion
-    ended: bool = True  # whether it came to rest at the target
+    ended: bool = True  # whether the shaped reference came to rest at the target
 
 
 class RunningShaper(Protocol):
@@ -48,7 +48,7 @@ class RunningShaper(Protocol):
 
 
 class RunningFilter:
-    """A filter in operation; it fails if its shaper's function does, so that no result has old weights."""
+    """A filter in operation; if its shaper's function fails, it fails too, so that no result has old weights."""
 
     def __init__(self, tvist: Filter) -> None:
         self._tvist = tvist
@@ -74,8 +74,8 @@ class RunningFilter:
 
 def shape(stepper: RunningShaper, reference: Floats, *, watched: bool) -> Shaped:
     """Apply a shaper to a reference, at rest at both ends, until the output rests at the target."""
-    # If it is watched, the shaper must end, keep its declared delay and hide no tail, else ShaperFaultError is
-    # raised; its processor time is measured.
+    # With `watched`, measure the shaper's processor time, and raise ShaperFaultError unless the output ends, keeps
+    # the declared delay, and does not move again later.
     target, stop = reference[-1], len(reference) - 1
     q, cost = _through(stepper, reference, timed=watched)
     declared = [stepper.delay]

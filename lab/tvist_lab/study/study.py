@@ -71,7 +71,7 @@ class Study:
     by: tuple[str, ...] = ()
     """Axes that the tables distinguish besides arms and methods; the figure is drawn over the first one.
     Other axes, such as the number of the move, are summarized."""
-    pooled: tuple[str, ...] = ()  # what the tables do not distinguish although it differs: "arm" or "shaper"
+    pooled: tuple[str, ...] = ()  # "arm" or "shaper" if a line of the tables covers all arms or shapers
     splits: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """Further axes for additional summaries, by their names in --json."""
     show: tuple[str, ...] = ("reduction_percent", "delay_ms")
@@ -82,31 +82,31 @@ class Study:
     measures: tuple[str, ...] = OF_PEAKS  # measures kept in the rows besides those that the columns need
     prepare: Callable[[pl.DataFrame], pl.DataFrame] = lambda rows: rows
     """Transforms all rows before they are grouped."""
-    finish: Callable[[Result], None] = lambda _: None  # adds to a result what no column can compute
+    finish: Callable[[Result], None] = lambda _: None  # adds values to a result that no column can compute
     tables: Callable[[Result], Sequence[ResultTable]] | None = None
-    """Returns the tables; None for one with the summary."""
+    """Returns the tables; None for a single table with the summary."""
     draw: Callable[[Result], Figures] | None = None  # None: measures over the first axis
-    as_served: bool = True  # whether moves are planned for the shaper as by a robot
+    as_served: bool = True  # whether moves are planned for the shaper, as a robot does
     notes: str = ""
     facts: Mapping[str, Any] = field(default_factory=dict)  # properties of the cases, for --json
     identity: Mapping[str, Any] = field(default_factory=dict)
-    """What determines the rows besides title, facts and version of tvist: rows of another identity are not
-    continued."""
+    """Data that determine the rows besides title, facts and version of tvist; stored rows with another identity
+    are not continued."""
 
     @property
     def shown(self) -> tuple[Column, ...]:
-        """Columns of its table, without those that distinguish the lines."""
+        """Columns of the study's table, without those that distinguish the lines."""
         return self.columns or columns_of(self.show, few=False)
 
     def jobs(self, places: Iterable[int] | None = None) -> Iterator[Job]:
-        """Create the jobs of the cases at these places, by default of all."""
+        """Create the jobs of the cases with these indices, by default of all cases."""
         measures = self.measured
         for case in self.cases if places is None else map(self.cases.__getitem__, places):
             yield Job(case, case.methods or tuple(self.methods), measures, self.as_served)
 
     @property
     def measured(self) -> tuple[str, ...]:
-        """All measures."""
+        """Names of all measures that are kept in the rows."""
         return tuple(dict.fromkeys((*self.measures, *(name for name in self._needed() if name in MEASURES))))
 
     @property
@@ -119,7 +119,7 @@ class Study:
 
     @property
     def keys(self) -> list[str]:
-        """What the tables distinguish."""
+        """Names of the columns by which the tables distinguish lines."""
         several = ["arm"] if len(self.cases[0].arms) > 1 else []
         return [name for name in dict.fromkeys((*self.by, *several, "shaper")) if name not in self.pooled]
 
@@ -165,7 +165,7 @@ class Study:
                 raise StudyError(f"column {one.title!r} needs an expression, such as median({one.of!r})")
 
     def determined_by(self) -> dict[str, Any]:
-        """Return what determines the rows, by names for messages."""
+        """Return all data that determine the rows, by their names in messages."""
         return {"title": self.title, **self.facts, **self.identity, "version of tvist": version("tvist")}
 
     def frame(self, rows: Sequence[Row]) -> pl.DataFrame:

@@ -51,8 +51,8 @@ class Bench:
         reference = case.reference()
         self.task = Task(case.description, case.declared, reference, case.limits, job.as_served, case.stream)
         """Task of the first method."""
-        # The friction in the robot's calibration is fed forward for every method, shaped or not; a method with
-        # another friction sets `Shaped.law`.
+        # The friction in the robot's calibration is fed forward for every method, shaped or not, unless the method
+        # sets another friction, `Shaped.law`.
         recipes = (getattr(method, "recipe", None) for method in job.methods)
         law = next((recipe.friction(case.description) for recipe in recipes if recipe is not None), None)
         self._line = ControlLine(
@@ -105,14 +105,14 @@ def measure(job: Job) -> tuple[Row, ...]:
 
 
 def measure_each(job: Job) -> tuple[Row, ...]:
-    """Make a case by every method; a failing method loses only its own rows."""
+    """Make a case by every method; if a method fails, only its own rows have no results."""
     try:
         share = 0.0 if job.case.stream or not job.as_served else job.case.torque_share
         if share > 1.0:
             return failed(job, TOO_WEAK, f"the move needs {100.0 * share:.0f} % of a drive's torque")
         bench = Bench(job)
         if job.as_served:
-            for arm in job.case.arms:  # where the unshaped motion fails, no method is to blame
+            for arm in job.case.arms:  # if the unshaped motion fails on an arm, no method is to blame
                 _ = bench.unshaped(arm.name).peak
     except Exception as error:  # noqa: BLE001  it costs these rows alone
         return failed(job, FAILED, why(error))

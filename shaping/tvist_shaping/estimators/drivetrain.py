@@ -53,7 +53,7 @@ class Drivetrain:
         )
 
     def system(self, mass: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return inertia, damping and stiffness of the L coordinates, then the n motors, each of shape (L+n, L+n).
+        """Return the inertia, damping and stiffness matrices of L coordinates followed by n motors, (L+n, L+n) each.
 
         Args:
             mass: M(q), shape (L, L) [kg m^2].

@@ -29,7 +29,7 @@ def flexible_joint(inertia: float, stiffness: float, damping: float) -> tuple[fl
         damping: D of the damper parallel to the spring [N m s/rad], >= 0.
 
     Raises:
-        EstimatorError: A value is out of range, or so much damping leaves no vibration.
+        EstimatorError: A value is out of range, or the damping is so large that nothing vibrates.
     """
     check_positive(EstimatorError, inertia=inertia, stiffness=stiffness)
     critical = 2.0 * math.sqrt(stiffness * inertia)

@@ -28,7 +28,7 @@ RESTING, MOVING, JUMPED = range(3)  # relation of a configuration to the previou
 
 @compiled
 def compare(q: Floats, last: Floats) -> int:
-    """Compare a configuration with `last`, and overwrite that; return RESTING, MOVING or JUMPED."""
+    """Compare a configuration with `last`, then store it in `last`; return RESTING, MOVING or JUMPED."""
     how = RESTING
     for joint in range(q.shape[0]):
         change = abs(q[joint] - last[joint])
@@ -118,7 +118,7 @@ class Modal(Estimator):
 
     def settle(self, q: Floats) -> tuple[Floats, Floats]:
         """Estimate the lowest modes at a configuration, regardless of the last estimate; see `estimate`."""
-        if self._lie(q) != RESTING or not self._lowest:
+        if self._compare_with_last(q) != RESTING or not self._lowest:
             self._take_lowest(q, self._mass_matrix(q))
         return self._describe()
 
@@ -133,8 +133,8 @@ class Modal(Estimator):
         self.clipped = beyond or self._lost
         return f_d, zeta
 
-    def _lie(self, q: Floats) -> int:
-        """Compare a configuration with the last one, and take its place; the first is a jump."""
+    def _compare_with_last(self, q: Floats) -> int:
+        """Compare a configuration with the last one, then store it as the last; the first counts as a jump."""
         if q.shape != self._q.shape:
             if q.ndim != 1:
                 raise EstimatorError("q", q.shape, "of shape (joints,)")
@@ -147,7 +147,7 @@ class Modal(Estimator):
         return compare(q, self._q)
 
     def _go_to(self, q: Floats) -> None:
-        how = self._lie(q)
+        how = self._compare_with_last(q)
         if how == RESTING and not self._lost:
             return
         mass = self._mass_matrix(q)

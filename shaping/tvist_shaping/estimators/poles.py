@@ -21,7 +21,7 @@ APART = 1e-7  # relative distance below which two poles may be the same one [-]
 def follow(  # noqa: C901, PLR0912 - one kernel: its branches are loops over coordinates
     mass: Floats, rows: Floats, poles: Complex, shapes: Complex, matrix: Complex
 ) -> bool:
-    """Follow every pole by Newton's method from its last value, in place; return whether all converged apart.
+    """Update every pole in place by Newton's method; return whether all converged, to different poles.
 
     After a failure, poles and shapes are invalid. `rows` are `Drivetrain.rows`; `matrix` is scratch, shape (L, L + 1).
     """
@@ -86,7 +86,7 @@ def follow(  # noqa: C901, PLR0912 - one kernel: its branches are loops over coo
     for k in range(poles.shape[0]):
         for m in range(k):
             if abs(poles[k] - poles[m]) < APART * abs(poles[k]):
-                # The same pole found twice has one shape; two poles that cross have two.
+                # If two poles are nearly equal, equal shapes mean that one pole was found twice; crossing poles differ.
                 along = 0.0j
                 first, second = 0.0, 0.0
                 for i in range(L):

@@ -26,9 +26,9 @@ def basis(
     """Return joints, centre of their angles [rad] and multiples m of the functions φ_i.
 
     With u = q - centre of the joints, the functions are 1, and cos(m·u), sin(m·u) for integer m ≠ 0
-    with Σ |m_k| <= degree; of m and -m, only the one whose first non-zero entry is positive. They
-    are periodic in every joint, as the arm is, and ordered by degree, which the coefficients rely
-    on. Raise EstimatorError if an argument is invalid.
+    with Σ |m_k| <= degree; of m and -m, only the one whose first non-zero entry is positive. The
+    functions are periodic in every joint, as the arm is. Their order, by degree, is that of the
+    coefficients. Raise EstimatorError if an argument is invalid.
     """
     n = len(joints)
     if not 1 <= n <= MAX_JOINTS or len(set(joints)) != n or not set(joints) <= set(range(MAX_JOINTS)):

@@ -147,7 +147,7 @@ def _decoder(
     path: Path, decoder_for: Callable[[str, Schema], Decoder | None], channel: Channel, schema: Schema
 ) -> Decoder:
     try:
-        with redirect_stderr(io.StringIO()):  # the parser prints what it raises
+        with redirect_stderr(io.StringIO()):  # the parser also prints the errors that it raises
             decode = decoder_for(channel.message_encoding, schema)
     except Exception as error:
         raise LogError(f"{path}: the schema of {channel.topic} is damaged: {quoted(error)}") from error
@@ -189,7 +189,7 @@ def _row(topic: _Topic, message: Any) -> dict[str, list[float]]:
         case "Imu":
             row = {ACCELEROMETER: _xyz(message.linear_acceleration)}
             turning = _xyz(message.angular_velocity)
-            return row | ({GYROSCOPE: turning} if any(turning) else {})  # all zero: it has no gyroscope
+            return row | ({GYROSCOPE: turning} if any(turning) else {})  # only zeros: there is no gyroscope
         case _:
             turn = message.pose.orientation
             vector = Rotation.from_quat([turn.x, turn.y, turn.z, turn.w]).as_rotvec()

@@ -9,8 +9,8 @@ from tvist_lab.recordings.checks import LogError, content
 from tvist_lab.recordings.table import BINARY, STRANGE, LogTable, reader
 
 SIZES = (1044, 1060, 1108, 1116, 1140, 1220)
-"""Lengths of a packet [bytes], from software 3.0 on; each later one starts like the earlier ones."""
-OLD = 812  # length of a packet of software 1.8, which has another order
+"""Lengths of a packet [bytes] since software 3.0; longer packets start with the fields of shorter ones."""
+OLD = 812  # length of a packet of software 1.8, whose fields have another order
 
 
 @reader(BINARY)
@@ -48,7 +48,7 @@ def _packets(path: Path, data: bytes) -> tuple[list[int], int, int]:
 
 
 def _first(path: Path, data: bytes) -> tuple[int, int]:
-    """Return first byte and length of the first packet that another one follows."""
+    """Return first byte and length of the first packet that is followed by another packet."""
     for size in (*SIZES, OLD):
         head = struct.pack(">i", size)
         at = data.find(head)

@@ -24,7 +24,7 @@ from tvist_lab.recordings.description import KEY, described
 from tvist_lab.recordings.recording import Floats
 from tvist_lab.recordings.table import LogTable, reader
 
-DENSEST = 2000  # largest ratio of the content to the size of its file; recordings reach a tenth of it
+DENSEST = 2000  # largest accepted ratio of content to file size; recordings reach a tenth of this
 
 
 @reader(".parquet")
@@ -71,7 +71,7 @@ def read_npz(path: Path) -> LogTable:
 
 
 def _array(data: bytes) -> NDArray[np.generic]:
-    """Decode an array, which cannot claim more numbers than it has."""
+    """Decode an array; refuse one that claims more numbers than its data have."""
     stream = io.BytesIO(data)
     header = npy.read_array_header_1_0 if npy.read_magic(stream) == (1, 0) else npy.read_array_header_2_0
     shape, by_columns, kind = header(stream)

@@ -1,4 +1,4 @@
-"""Describe an arm from its robot file, with the origin of its numbers."""
+"""Describe an arm by its robot file, and say where the file's numbers come from."""
 
 from typing import Any
 

@@ -9,7 +9,7 @@ POSES = {"Q1": "stretched out", "Q2": "stretched out to the side", "Q3": "folded
 
 
 def answer(report: dict[str, Any], motion: str) -> list[str]:
-    """Return what shaping did to one motion, and briefly to the others, one or two sentences a line."""
+    """Return lines of one or two sentences on the effect of shaping on one motion, and briefly on the others."""
     start, end = motion.split("-")
     change, longer = _change(report, motion), report["baselines"][motion]["shaped"]["delay_ms"]
     before, after = map(_number, (change.before, change.after))
@@ -40,7 +40,7 @@ def terms(report: dict[str, Any], motion: str) -> dict[str, str]:
 
 
 def checks(report: dict[str, Any], difference: str | None) -> dict[str, str]:
-    """Return how far the figures can be trusted; `difference` is the first of the replay, if any."""
+    """Return what limits the accuracy of the figures; `difference` is the first one in the replay, if any."""
     ticks, missed, lost = (
         report[name] for name in ("replayed_ticks", "missed_ticks", "states_lost_on_the_way")
     )

@@ -26,18 +26,18 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True)
 class PaperMethod:
-    """A method for making a motion: a shaper, and the modes that it is designed for."""
+    """A method for making a motion: a shaper, and the modes for which the shaper is designed."""
 
     name: str
     label: str  # name for display
     shaper: str = "none"
     modes: tuple[float, float] | None = None
     """Constant design frequency [Hz] and damping ratio [-]; None for the polynomials of the robot's calibration."""
-    frozen: bool = False  # whether it uses the modes of the end pose throughout
+    frozen: bool = False  # whether the shaper keeps the modes of the end pose during the whole motion
     jerk: float = JERK  # jerk limit of the motion [rad/s³]
 
     async def prepare(self, robot: Robot, arm: Arm, end: tuple[float, ...]) -> None:
-        """Set up a robot at rest for a motion that ends at a pose; without a shaper, the estimate is still recorded."""
+        """Set up a robot at rest for a motion that ends at a pose; even without a shaper, modes are recorded."""
         modes = self.modes
         await arm.set_estimator("polynomial")
         if self.frozen:
@@ -64,7 +64,7 @@ def fixed(shaper: str, f_d: float, zeta: float) -> PaperMethod:
 
 def equal_duration(delay: float) -> PaperMethod:
     """Return a motion without shaper and model that takes as long as a shaped one with this delay [s]."""
-    # A double S that reaches its limits lasts way/v + v/a + a/j, so an increase of a/j lengthens it equally.
+    # A double S that reaches its limits lasts way/v + v/a + a/j, so it gets longer by as much as a/j.
     jerk = ACCELERATION / (ACCELERATION / JERK + delay)
     return PaperMethod("equal_duration_double_s", "longer double S", jerk=jerk)
 
@@ -84,7 +84,7 @@ class Experiment:
     info: Info
     seed: int
     runs: int
-    table_1: dict[str, dict[str, float]]  # lowest mode at each pose, and the true one if known
+    table_1: dict[str, dict[str, float]]  # lowest mode at each pose, and the true lowest mode if known
     judged: dict[tuple[str, str], list[JudgedRun]] = field(default_factory=dict)
     """Results of all runs, by motion and method."""
     labels: dict[str, str] = field(default_factory=dict)
@@ -136,7 +136,7 @@ async def run(robot: Robot, arm: Arm, motion: str, method: PaperMethod, seed: in
     await method.prepare(robot, arm, end)
     reset = await arm.reset(q=start, seed=seed) or 0
     await robot.advance(1)
-    await robot.until(reset + 1)  # an answer may overtake earlier states
+    await robot.until(reset + 1)  # the answer may arrive before states of earlier ticks
     with collect(robot) as collected:
         await robot.advance(round(BEFORE / period))
         await arm.move_j(end, jerk=method.jerk)

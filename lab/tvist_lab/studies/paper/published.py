@@ -18,6 +18,6 @@ def pose(name: str) -> tuple[float, ...]:
 
 
 ARMS = ("ur5e", "ur5e_stiction")
-"""Robots for the experiment: one fitted to Table 1, and one tuned to Table 2 as well."""
+"""Robots for the experiment: the first is fitted to Table 1, the second is also tuned to Table 2."""
 MOTIONS = {"Q1-Q2": ("Q1", "Q2"), "Q1-Q3": ("Q1", "Q3"), "Q3-Q1": ("Q3", "Q1")}
 """Start and end of the three motions, by name."""

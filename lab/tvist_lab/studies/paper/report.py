@@ -38,7 +38,7 @@ OF_MOTION = (
 ADJUSTED = {
     "UR5e": {"Table 1": FITTED, "RV unshaped": TUNED, "RV reduced by": TUNED},
     "UR5e_stiction": {"Table 1": FITTED} | dict.fromkeys([name for name, *_ in OF_MOTION[1:]], TUNED),
-}  # figures to which each arm's parameters were fitted or tuned, by model; all others are predicted
+}  # by model, the figures to which the arm's parameters were fitted or tuned; all others are predicted
 
 FIGURES = ("delay ms", "stabilisation ms", "cycle ms", "overshoot m", "RV m/s²")
 IMPACTS = ("stabilisation", "cycle", "overshoot", "residual_vibration")
@@ -71,7 +71,7 @@ def as_dict(done: Experiment) -> dict[str, Any]:
 
 
 def _methods(done: Experiment, motion: str) -> dict[str, dict[str, float | None]]:
-    """Return the results of each method, starting with the unshaped one, which corresponds to waiting."""
+    """Return the results of each method, first of the unshaped motion, which stands for waiting."""
     unshaped = done.judged[motion, "unshaped"]
     return {method: _row(judged, unshaped) for (ran, method), judged in done.judged.items() if ran == motion}
 
@@ -157,7 +157,7 @@ def table_2(table: dict[str, Any], digits: int) -> list[tuple[str, ...]]:
 
 
 def methods(result: dict[str, Any], motion: str, first: str) -> list[tuple[str, ...]]:
-    """Return the rows of a motion's table of methods; `first` formats the earliest at rest, such as "**{}**"."""
+    """Return rows of a motion's table of methods; `first`, such as "**{}**", formats the method earliest at rest."""
     rows = result["baselines"][motion]
     known = [row["still_after_ms"] for row in rows.values() if row["still_after_ms"] is not None]
     soonest = min(known, default=None)

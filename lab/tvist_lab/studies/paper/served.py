@@ -19,12 +19,12 @@ class ServedExperiment:
     """One run of the experiment on a served robot."""
 
     done: Experiment
-    report: dict[str, Any]  # results as plain values, with those of the checks
+    report: dict[str, Any]  # results of the experiment and of the checks, as plain values
     difference: str | None  # first difference between replay and recording; None if there is none
 
     @property
     def equal(self) -> bool:
-        """Whether the replay gave equal states, and the recording the figures of the live stream."""
+        """Whether the replay gave equal states, and recording and live stream gave equal figures."""
         return self.difference is None and bool(self.report["recording_gives_same_figures"])
 
 
@@ -61,7 +61,7 @@ async def _run(path: Path, seed: int, progress: Progress) -> Experiment:
 
 
 def _measure(done: Experiment, content: RecordingFile) -> tuple[bool, int]:
-    """Measure each motion in the recording; return whether a complete live stream agrees, and the lost states."""
+    """Measure each motion in the recording; return whether live streams without loss agree, and states lost."""
     same, lost = True, 0
     for key, received in list(done.first.items()):
         ticks = received["tick"]
