@@ -1,4 +1,4 @@
-"""Expressions of a program saved by PolyScope, and the names in them, as URScript."""
+"""Translates expressions of a program saved by PolyScope, and the names in them, to URScript."""
 
 import re
 from xml.etree.ElementTree import Element

@@ -13,7 +13,7 @@ Change = Callable[[UrRobot, ConnectionControl], Awaitable[Refused | None]]
 
 
 def _change(command: MakeCommand, there: Callable[[Snapshot], bool] = lambda _: False) -> Change:
-    """Return a change; a refusal counts as success if the robot is already `there`, in the requested mode."""
+    """Return a change by this command; if the robot refuses it but is `there`, in the wanted mode, it succeeds."""
 
     async def change(robot: UrRobot, control: ConnectionControl) -> Refused | None:
         reply, latest = await control.change(command), robot.latest
@@ -24,14 +24,14 @@ def _change(command: MakeCommand, there: Callable[[Snapshot], bool] = lambda _: 
     return change
 
 
-power_on = _change(  # of an arm that is off; its brakes stay closed
+power_on = _change(  # switches power on; the brakes stay closed
     lambda token: PowerOn(token=token, release_brakes=False),
     lambda latest: latest.robot_mode in (RobotMode.IDLE, RobotMode.BACKDRIVE, RobotMode.RUNNING),
 )
-release_brakes = _change(  # makes the arm ready to move, from any mode
+release_brakes = _change(  # also switches power on if necessary
     lambda token: PowerOn(token=token), lambda latest: latest.robot_mode == RobotMode.RUNNING
 )
-power_off = _change(lambda token: PowerOff(token=token))  # once the arm is at rest; this ends any program
+power_off = _change(lambda token: PowerOff(token=token))  # stops the motion first; ends any program
 unlock = _change(
     lambda token: UnlockProtectiveStop(token=token),
     lambda latest: latest.safety_mode != SafetyMode.PROTECTIVE_STOP,
