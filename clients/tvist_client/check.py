@@ -48,7 +48,7 @@ class CheckReport(msgspec.Struct):
     protocol: int | None = None  # version of the protocol that the robot uses; null if it did not answer
     state_rate_hz: float | None = None
     """States received per second of this machine's clock [Hz]; null in lockstep, or if no state came."""
-    findings: list[CheckResult] = []  # one result per step; a step that fails is the last one
+    findings: list[CheckResult] = []  # one result per step; if a step fails, no further step is made
     ready: bool | None = None  # whether the robot may be moved; null if that was not checked
     robot_mode: str | None = None  # RTDE name of the robot mode; null if it was not checked or is unknown
     safety_mode: str | None = None  # RTDE name of the safety mode; null if it was not checked or is unknown

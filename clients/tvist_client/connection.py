@@ -87,7 +87,7 @@ class Connection(Questions):
         return self._ios.listen(callback)
 
     async def io(self) -> Io:
-        """Return inputs, outputs, registers and tool: the latest values, or else the next ones, within about 1 s.
+        """Return inputs, outputs, registers and tool: the latest values, or if none have come yet the next ones (1 s).
 
         Raises:
             AnswerTimeoutError: No message arrived within `STATE_S`.
@@ -205,7 +205,7 @@ class Connection(Questions):
         return await self._states.next(lambda state: state.tick >= tick, STATE_S)
 
     async def rest(self) -> State:
-        """Step time until the shaped reference is at rest, or wait if others step; return the first such state.
+        """Step time, or wait if this client cannot, until the shaped reference is at rest; return the first state then.
 
         The arm may still vibrate.
         """

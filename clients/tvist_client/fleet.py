@@ -236,7 +236,7 @@ class ManyStates(FleetSession):
     """Newest state of each robot that a key selects, decoded by `look`. Use it as an asynchronous context.
 
     `selector` is a key with wildcards that ends in `/state`, such as `tvist/*/state`, or `**/tvist/*/state` for all
-    namespaces; MisuseError if it is not. `namespace` precedes it.
+    namespaces; MisuseError for other keys. The selector applies within `namespace`.
     """
 
     def __init__(

@@ -26,7 +26,7 @@ class Portal:
         self.closed = False
 
     def call(self, function: Callable[[], Any]) -> Any:
-        """Run a function on the loop; wait for its result (of a coroutine: for the end). Ctrl-C cancels it.
+        """Run a function on the loop; wait for its result, or that of its coroutine. Ctrl-C cancels the coroutine.
 
         An error of the client or protocol is raised without the distracting part of its traceback within the loop.
         Raise NotConnectedError if the portal is closed; MisuseError in a callback, because the call would never return.

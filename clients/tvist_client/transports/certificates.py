@@ -57,7 +57,7 @@ def settings(endpoint: str, security: Folder | None) -> dict[str, Any]:
 def why_refused(endpoint: str, security: Folder | None, whose: str = "robot") -> str | None:
     """Return why no session could be opened. Zenoh does not report this, so a separate handshake finds it out.
 
-    This blocks for at most three times `PROBE_S`; None: another cause, such as that no server listens. `whose` is for
+    Blocks for at most three times `PROBE_S`. None: another cause, such as that no server listens. `whose` is for
     messages.
     """
     protocol, _, address = re.split("[?#]", endpoint)[0].partition("/")

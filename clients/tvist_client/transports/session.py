@@ -32,7 +32,7 @@ CONFIG: Mapping[str, Any] = {
 
 
 def open_session(endpoint: str, security: Folder | None = None, namespace: str = "") -> zenoh.Session:
-    """Open a session, whose keys omit the namespace. Blocks while it connects."""
+    """Open a session, in which keys are written without the namespace. Blocks until it is connected."""
     invalid = (
         f"{quoted(endpoint)} is not an endpoint: it must have the form tcp/<host>:<port>, such as "
         "tcp/127.0.0.1:7447, with a port from 1 to 65535"
