@@ -82,7 +82,7 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
         return ProgramFolder.of(_folder("programs", self.programs), name)
 
     def dump_folder(self) -> Path:
-        """Return the folder for the record of the last second before a failure; raise StartError if it is not one."""
+        """Return the folder for records of the last second before a failure; StartError if the path is no folder."""
         if self.dump is not None:
             return _folder("dump", self.dump)
         try:
@@ -99,7 +99,7 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
         return ticks_of(self.keep, "keep")
 
     def interfaces(self, number: int) -> tuple[str, dict[InterfaceName, int]]:
-        """Return address and ports of a robot's UR interfaces, by its index; StartError if there is no such address."""
+        """Return address and ports of the UR interfaces of robot `number`; StartError if there is no such address."""
         try:
             first = ipaddress.ip_address(self.ur_address)
             address = first + number

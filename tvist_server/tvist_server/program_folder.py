@@ -38,7 +38,7 @@ class ProgramFolder:
             return []
 
     def read(self, name: str) -> str | None:
-        """Return a program's text, ignoring its path (None: no such file); UserFileError if it is not a program."""
+        """Return a program's text, ignoring folders in `name`; None: no such file. UserFileError if no program."""
         file = PurePosixPath(name).name
         candidates = [file, file.removesuffix(URP) + SCRIPT] if file.endswith(URP) else [file]
         for candidate in candidates:

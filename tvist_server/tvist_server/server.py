@@ -49,7 +49,7 @@ class RecordingResult(NamedTuple):
 
     place: str  # description of its location
     dropped: int  # number of messages dropped because the queue was full
-    error: str | None  # reason why it ended early; None: it did not
+    error: str | None  # reason why the recording ended early; None: it did not
 
 
 class Server:

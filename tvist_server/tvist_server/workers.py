@@ -166,7 +166,7 @@ class Workers:
 
     def _start(self, who: str, do: Callable[[ParentPipe], None]) -> _Worker:
         ours, theirs = multiprocessing.Pipe()
-        # A process that keeps another one's pipe open would hide the end of the first process from it.
+        # A process that keeps another process's pipe open would hide the end of the first process from that one.
         rest = [ours, *(worker.pipe for worker in self._front + self._workers)]
         context = multiprocessing.get_context("fork")
         process = context.Process(target=_begin, args=(do, theirs, rest, self._folder))

@@ -162,7 +162,7 @@ def integer(value: Any, what: str) -> int:
 
 
 def exactly(wanted: type[T], value: Any, what: str) -> T:
-    """Return the value if it has exactly the type `wanted` and no subtype of it; otherwise raise Fault."""
+    """Return the value if its type is exactly `wanted` (a pose, for example, is no list); otherwise raise Fault."""
     if type(value) is wanted:
         return value
     raise Fault(f"{what} has to be {KINDS[wanted]}, not {kind(value)}")

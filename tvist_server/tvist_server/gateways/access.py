@@ -25,7 +25,7 @@ MESSAGES = (
 
 
 def access_control(robots: Sequence[str], roles: Mapping[str, Role], namespace: str = "") -> dict[str, Any]:
-    """Return Zenoh's `access_control` settings for a server with certificates; no role (by common name), no access."""
+    """Return Zenoh's `access_control` settings for a server with certificates. Without a role: no access."""
     robots = [_at(namespace, robot) for robot in robots]
     viewing, operating = _viewing(robots), _operating(robots)
     rules_of: dict[Role, list[Rule]] = {"viewer": viewing, "operator": [*viewing, *operating]}

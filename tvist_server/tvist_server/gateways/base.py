@@ -50,7 +50,7 @@ class CommandIntake:
         """Take an encoded set-point."""
 
     def client_seen(self, client: str, session: str = "") -> None:
-        """Note that a client's liveliness token has appeared; it may name the session that declared it."""
+        """Note that a client's liveliness token has appeared; `session` has declared it, if the token names one."""
 
     def client_gone(self, client: str, session: str = "") -> None:
         """Note that a client's liveliness token, or the session that declared it, has disappeared."""

@@ -90,7 +90,7 @@ class Console:
 
 
 class ConsoleGateway(Gateway):
-    """Passes the events of the robot `name` to the console; `command_line` builds its commands."""
+    """Passes events of the robot `name` to the console; `command_line` returns a command line for this robot."""
 
     wanted_topics: Collection[Topic] = frozenset[Topic]({"event"})
 

@@ -72,8 +72,8 @@ def robots_of(text: str) -> list[RobotPlace]:
 def downsampling(rates: Sequence[Rate], robots: Sequence[RobotPlace]) -> list[dict[str, Any]]:
     """Return Zenoh's `downsampling` settings for what leaves the router.
 
-    Zenoh limits the sum of all keys that match a rule, and if several rules match a key, applies any one of
-    them. If robots are listed, there is no rule for the others: it could match the listed ones, too.
+    A rule limits the total rate of all keys that it matches. If several rules match a key, Zenoh applies any
+    of them. So if robots are listed, there is no rule for all robots: Zenoh might apply it to listed ones.
     """
     listed = {keys.within(place.namespace, f"{keys.PREFIX}/{place.robot}") for place in robots}
     rules = [f"{place}/{leaf}" for place in sorted(listed) or [keys.ANYWHERE] for leaf in REDUCED]

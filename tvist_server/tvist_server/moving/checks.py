@@ -1,4 +1,4 @@
-"""Checks whether a robot may be moved and still follows; if not, they return the reason and the remedy."""
+"""Functions that return why a robot must not be moved, or no longer follows, and the remedy; else None."""
 
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
@@ -165,7 +165,7 @@ def _load_trouble(expected: Expected, sight: Sight) -> str | None:
 
 
 def mounting_trouble(description: RobotDescription, q: Floats, felt: Floats) -> str | None:
-    """Return why the robot may not be mounted as its file says; None if it is.
+    """Return why the robot's mounting seems to differ from its file; None if it agrees.
 
     `q`: joint angles at rest, shape (6,) [rad]; `felt`: mean specific force in the flange frame, shape (3,) [m/s²].
     """

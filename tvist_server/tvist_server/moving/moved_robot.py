@@ -213,7 +213,7 @@ class ControlPeriods:
         return self.next(now)
 
     def next(self, now: float) -> bool:
-        """Start the next period if one is owed or a local one is due; return whether it starts."""
+        """If a period is owed, or due by the local clock while the robot is silent, start it and return True."""
         if self.owed:
             self.owed -= 1
         elif self.silent(now) and now >= self._due:

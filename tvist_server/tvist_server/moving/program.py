@@ -30,7 +30,7 @@ MAX_NUMBER = 2**30
 NUMBER = 24
 """Input integer: number n of the newest set-point, increased by 1 in each control period; 0: no set-point yet."""
 ORDER = 25
-"""Input integer: number of the run that may follow; else the run ends. The negative number also ends its wait."""
+"""Input integer: number of the run that may follow. Other values end a run, but only -number ends one that waits."""
 SETPOINTS = 24  # first of the input doubles: joint angles of set-point n, then of n-1, n-2 and n-3 [rad]
 
 STATE = 24  # output integer: a `ProgramState`

@@ -30,7 +30,7 @@ from tvist_server.watching.address import RobotAddress
 from tvist_server.watching.watched_robot import WatchedRobot
 
 DECELERATION = 5.0  # smallest deceleration of the fastest joint when the program brakes [rad/s²]
-BRAKES = 0.125  # longest time to brake from the speed cap [s]; may need more than `DECELERATION`
+BRAKES = 0.125  # time to brake from the speed cap [s], if this needs more than `DECELERATION`
 SETTLES = 25
 """Number of rows to await from the waiting program before the first set-point: its start delays some rows."""
 GRACE = 5  # number of rows after the program's end in which the modes may still show the reason

@@ -176,7 +176,7 @@ class Moves:
     # ------------------------------------------------------------------ directions
 
     def direction(self, node: Element) -> None:
-        """Translate a motion in a direction: a thread moves until one of the Until nodes ends it."""
+        """Translate a motion in a direction: a thread moves the arm until the condition of an Until node ends it."""
         style, text, number = self._style, self._text, self._text.numbers[node]
         feature = node.find("feature")
         shown, frame = self.feature(style.feature if feature is None else feature)

@@ -27,7 +27,7 @@ from tvist_server.recording.writer import heading
 log = logging.getLogger(__name__)
 
 QUEUE_SIZE = 8192
-"""Number of messages that may wait: 30 MB, five seconds at 1500 messages/s, as a file system's commit may take."""
+"""Number of messages that may wait: 30 MB or five seconds, for which a file system's commit may block writing."""
 PAUSE = 0.02
 """Time between two checks of the queue [s]; waking the writer would cost a system call and the interpreter's lock."""
 CHECK_EVERY = 1.0  # time between two checks whether the file was moved or deleted [s]

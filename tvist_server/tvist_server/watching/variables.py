@@ -110,7 +110,7 @@ class RowCount:
         self.rows = self.missing = 0  # numbers of rows taken and missing since the first one
 
     def take(self, timestamp: float, now: float, *, reconnected: bool = False) -> Counted | None:
-        """Take a row at the robot's and the local time [s]; return None if it repeats the last one.
+        """Take a row with its time by the robot's and by the local clock [s]; return None if it repeats the last row.
 
         Raise RtdeError if the robot's time goes back or deviates from the local one, unless the connection
         was lost before.

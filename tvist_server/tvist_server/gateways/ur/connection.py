@@ -48,7 +48,7 @@ REASONS = {
 
 
 class ClientConnection(asyncio.BufferedProtocol):
-    """One client at one interface; if it is lossless (lockstep), samples wait for a slow client."""
+    """One client's connection to one interface; if it is `lossless` (lockstep), samples wait for a slow client."""
 
     def __init__(
         self,
@@ -205,10 +205,10 @@ class ClientConnection(asyncio.BufferedProtocol):
 
 
 class ConnectionLimit:
-    """Decides which clients may connect, so that a flood of new ones does not disturb those at work.
+    """Decides which clients may connect, so that a flood of new clients does not disturb those that are working.
 
     When 90 % of the places are taken, each new client displaces the dispensable one that has been silent for
-    longest: a dashboard client, or an RTDE client outside the time from its start to its pause.
+    longest: a dashboard client, or an RTDE client that has not started or has paused its outputs.
     """
 
     def __init__(self, now: Callable[[], float], note: Callable[[str], None]) -> None:

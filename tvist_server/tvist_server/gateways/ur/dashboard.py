@@ -200,7 +200,7 @@ COMMANDS: Final = (
     Command("shutdown", _changing(power.power_off, "Shutting down")),
     Command(QUIT, _say("Disconnected")),
 )
-"""All commands; a longer keyword precedes one that it starts with."""
+"""All commands; if one keyword starts with another one, the longer keyword comes first."""
 
 
 def find(line: str) -> tuple[Command, str] | None:

@@ -1,4 +1,4 @@
-"""Control for clients without leases: a host's connections share it from its first command until the last closes."""
+"""Control for clients that know no leases: a host's connections share control until the last of them closes."""
 
 from collections.abc import Awaitable, Callable
 
@@ -96,7 +96,7 @@ class HostLease:
 
 
 class ConnectionControl:
-    """Access of one connection to the controller; `peer` names its client in messages."""
+    """Access of one connection to the controller; `peer` is the client's name in messages."""
 
     def __init__(
         self,

@@ -13,7 +13,7 @@ Change = Callable[[UrRobot, ConnectionControl], Awaitable[Refused | None]]
 
 
 def _change(command: MakeCommand, there: Callable[[Snapshot], bool] = lambda _: False) -> Change:
-    """Return a change by this command; if the robot refuses it but is `there`, in the wanted mode, it succeeds."""
+    """Return a change. If the robot refuses `command` but is already `there`, in the wanted mode, this is success."""
 
     async def change(robot: UrRobot, control: ConnectionControl) -> Refused | None:
         reply, latest = await control.change(command), robot.latest
@@ -40,6 +40,6 @@ _restart = _change(lambda token: RestartSafety(token=token))
 
 
 def restart_safety(robot: UrRobot, control: ConnectionControl) -> Awaitable[Refused | None]:
-    """Restart the safety system after a violation or a fault; otherwise power off the arm, as a restart does."""
+    """After a violation or a fault, restart the safety system; in other modes, only power the arm off."""
     failed = robot.latest is not None and robot.latest.safety_mode in (SafetyMode.VIOLATION, SafetyMode.FAULT)
     return (_restart if failed else power_off)(robot, control)

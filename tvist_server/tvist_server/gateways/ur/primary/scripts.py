@@ -23,7 +23,7 @@ class Unit:
     """A complete line or block."""
 
     text: str  # text with lines ended by line feeds; only its beginning if it is too long
-    line: int  # line at which its code starts, counted from 1; comments may precede it
+    line: int  # line at which its code starts, from 1; comments may precede the code
     column: int  # column in that line, counted from 1
     too_long: bool = False  # whether it is longer than `LONGEST` bytes and was therefore dropped
 
@@ -73,7 +73,7 @@ class ScriptReader:
     @property
     def unfinished(self) -> Unit | None:
         """Beginning of the incomplete unit; None if it has no code yet."""
-        if self._skipping:  # it was returned when it became too long
+        if self._skipping:  # the unit was returned when it became too long
             return None
         line, column = self._start or (self._unit.count(b"\n") + 1, 1)
         rest = self._lines.rest

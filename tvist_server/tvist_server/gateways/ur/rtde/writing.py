@@ -194,7 +194,7 @@ def _present(io: Io, name: str) -> Number:
 
 
 def _runs(cells: dict[int, tuple[Number, bool]]) -> Iterator[tuple[int, tuple[Number, ...]]]:
-    """Group registers with consecutive numbers; each group spans its first to its last new value."""
+    """Yield first number and values of each run of consecutive registers, from its first to its last new value."""
     for _, group in groupby(enumerate(sorted(cells)), lambda pair: pair[1] - pair[0]):
         new = [number for _, number in group if cells[number][1]]
         if new:
