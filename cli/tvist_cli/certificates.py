@@ -1,4 +1,4 @@
-"""Certificate authority and the certificates it signs, for mutual TLS; P-256, since many small devices lack Ed25519."""
+"""A certificate authority and its certificates for mutual TLS, with P-256, since many small devices lack Ed25519."""
 
 import ipaddress
 import os
@@ -15,9 +15,9 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 AUTHORITY_DAYS = 7300
 """Validity of an authority's own certificate [days]; the certificates it signs expire earlier."""
-SLACK = timedelta(hours=1)  # how far the clock of a client or robot may be behind
+SLACK = timedelta(hours=1)  # largest lag of the clock of a client or robot
 USAGES = {"robot": ExtendedKeyUsageOID.SERVER_AUTH, "client": ExtendedKeyUsageOID.CLIENT_AUTH}
-"""Extended key usage of each kind: a client's certificate cannot pass as a robot's, or the reverse."""
+"""Extended key usage of each kind, so that a client's certificate cannot pass as a robot's, or the reverse."""
 
 LABEL = re.compile(r"(?!-)(?=.*[A-Za-z0-9])[A-Za-z0-9_-]{1,63}")  # part of a host name between dots
 
@@ -54,7 +54,7 @@ class KeyPair:
         return self.certificate.not_valid_after_utc
 
     def write(self, certificate: Path, key: Path) -> None:
-        """Write both as new PEM files; only the owner can read the key."""
+        """Write certificate and key as new PEM files; only the owner can read the key's file."""
         form = serialization.PrivateFormat.PKCS8
         secret = self.key.private_bytes(serialization.Encoding.PEM, form, serialization.NoEncryption())
         write_new(key, secret, 0o600)
@@ -91,7 +91,7 @@ class CertificateAuthority(KeyPair):
     def issue(
         self, name: str, usage: Literal["robot", "client"], *, days: int, hosts: tuple[Host, ...] = ()
     ) -> KeyPair:
-        """Sign a certificate that is valid for some days, for a robot under its host names."""
+        """Create a key pair whose certificate is valid for `days`; a robot's certificate names its hosts."""
         key = ec.generate_private_key(ec.SECP256R1())
         mine = x509.SubjectKeyIdentifier.from_public_key(self.key.public_key())
         builder = (

@@ -9,7 +9,7 @@ SAY_EVERY = 10.0  # shortest time between two lines about progress where stderr 
 
 
 def compile_if_new(tell: Callable[[int, int], None] = lambda *_: None) -> None:
-    """Compile what is not on disk yet, and show progress; `tell` receives the kernels done and in all."""
+    """Compile kernels that are not on disk, and show progress; `tell` gets the numbers of compiled and all kernels."""
     from tvist_server.kernels import KERNELS, KernelsError, compiled
 
     done = compiled()
@@ -19,12 +19,12 @@ def compile_if_new(tell: Callable[[int, int], None] = lambda *_: None) -> None:
     say("compiling what a robot computes for this processor; this happens once and takes up to a minute")
     try:
         compile_shown(None, tell)
-    except KernelsError as error:  # the robot compiles for itself
+    except KernelsError as error:  # the robot can still compile kernels itself
         say(f"warning: the next start compiles again: {error}")
 
 
 def compile_shown(processes: int | None, tell: Callable[[int, int], None] = lambda *_: None) -> None:
-    """Compile ahead like `tvist_server.kernels`, and show progress as a bar or in lines."""
+    """Compile kernels in advance by `tvist_server.kernels`, and show progress as a bar or in lines."""
     from tvist_server.kernels import KERNELS, compile_ahead
 
     said, shown = time.monotonic(), 0

@@ -25,13 +25,13 @@ class Misuse(Failure):
 
 
 def interrupted(what: str) -> Failure:
-    """Return the failure for Control+C; `what` tells what was done and what was not."""
+    """Return the failure for Control+C; `what` is the part of its message that says what was done and what not."""
     return Failure(f"interrupted: {what}", code=130)
 
 
 @contextmanager
 def interruptible(what: str) -> Iterator[None]:
-    """Let Control+C end the body with the failure of `interrupted`."""
+    """Within the body, turn Control+C into the failure of `interrupted`."""
     try:
         yield
     except KeyboardInterrupt:
@@ -41,7 +41,7 @@ def interruptible(what: str) -> Iterator[None]:
 def check_range(
     name: str, value: float | None, low: float, high: float = math.inf, unit: str = "", *, above: bool = False
 ) -> None:
-    """Refuse an option's value outside `low` to `high`, or with `above` also `low` itself; None was not given."""
+    """Refuse an option's value outside `low` to `high`, with `above` also `low`; accept None, an option not given."""
     if value is None or (low <= value <= high and not (above and value == low)):
         return
     least = f"{'more than' if above else 'at least'} {low:g}"
@@ -53,11 +53,11 @@ def check_range(
 
 @contextmanager
 def failing_on(*errors: type[Exception], exit_code: int = 1, where: str = "") -> Iterator[None]:
-    """Turn errors of these types, of the house and of a robot's options into a `Failure` with the same message.
+    """Turn errors of these types, tvist's own and those of robot options into a `Failure` with the same message.
 
-    Whatever `exit_code` is, a file that exists but has the wrong content gives 1, and an invalid option
-    of a robot 2, unless `StartError` is among `errors`. `where` precedes the message, also that of a
-    `Failure` in the body, which then has `exit_code`.
+    The exit code is `exit_code`, except: 1 for a file with wrong content; 2 for an invalid option of a
+    robot, unless `errors` contains `StartError`. `where` precedes the message. If `where` is given, a
+    `Failure` in the body is changed in the same way.
     """
     kinds: tuple[type[Exception], ...] = (*errors, TvistError, StartError)
     kinds += (Failure,) if where else ()

@@ -31,14 +31,14 @@ class FigureOptions:
 
     @contextmanager
     def into(self, folder: Path) -> Iterator[Save]:
-        """Set the style in which figures are drawn; yield the function that saves them in a folder."""
+        """Set the style of figures for the body; yield the function that saves figures in the folder."""
         from tvist_lab.figures import house_style, save
 
         with house_style(*self.style or ()):
             yield lambda figure, name: save(figure, folder / f"{name}.{self.format or 'png'}")
 
     def write(self, folder: Path | None, draw: Callable[[], "Mapping[str, Figure]"]) -> None:
-        """Draw figures and write them to a folder under their names, unless it is None."""
+        """Unless `folder` is None, draw figures and write them there under their names."""
         if folder is not None:
             with self.into(folder) as save:
                 write(save, draw())
@@ -46,7 +46,7 @@ class FigureOptions:
     def check(self, folder: Path | None, *files: Path | None, option: str = "--figures") -> None:
         """Raise Failure, before anything is computed, if figures or other output files cannot be written as requested.
 
-        `folder` is None if `option`, the option that names it, was not given; so is each of `files`.
+        `folder` and each of `files` is None if its option was not given; `option` is that of `folder`.
         """
         for file in files:
             if file is not None and not file.parent.is_dir():

@@ -17,7 +17,7 @@ from tvist_protocol.calibration import ModalParameter, Spread
 
 Modes = Sequence[tuple[Spread | None, Spread | None]]  # deviations of f_d and ζ, the lowest mode first
 
-DEVIATIONS = ("measured at m/s²", "f_d median %", "p90 %", "ζ median %", "p90 %")  # heads of tables
+DEVIATIONS = ("measured at m/s²", "f_d median %", "p90 %", "ζ median %", "p90 %")  # column heads of tables
 FIGURES = ("f_d_percent", "f_d_p90_percent", "zeta_percent", "zeta_p90_percent")  # their keys in --json
 UNSEEN = "ring-downs at poses that were left out of the fit"
 QUANTITIES = {
@@ -47,7 +47,7 @@ def report(
     json: bool,
     more: Mapping[str, Any] | None = None,
 ) -> None:
-    """Print the fit of the ring-downs, its uncertainty, the jogs that would improve it, and how to serve with it."""
+    """Print the fit of the ring-downs, its uncertainty, jogs that would improve it, and a command that uses it."""
     model, how = found.calibration.modal, found.calibration.provenance
     assert model is not None, "each calibration has springs and drives"
     crossed = list(zip(model.cross_validated_f_d_percent, model.cross_validated_zeta_percent, strict=True))
@@ -141,7 +141,7 @@ def report(
         )
     for one in found.proposals:
         for line in _moves(one):
-            print(f"  {line}")  # in one line, to be copied
+            print(f"  {line}")  # each on one line, for copying
     out.print(f"written to {output}; use it with: tvist serve --calibration {output}{options}")
 
 
@@ -157,7 +157,7 @@ def _lag(servo: ServoResponse | None, *, positions: bool) -> None:
 
 
 def _wrong(found: Found) -> str:
-    """Name the stops that contradict the others."""
+    """Return a text that names the stops that contradict the others."""
     names = [f"{stop.log}, motion {stop.motion}" for stop in found.stops if stop.reason == CONTRADICTS]
     return f" ({'; '.join(names)}). Was the payload the declared one, and was the arm free?"
 

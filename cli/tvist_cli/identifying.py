@@ -1,4 +1,4 @@
-"""Identify a robot from ring-downs: simulated in this process, of a served robot, of one at ur://, or from logs."""
+"""Identifies a robot from ring-downs of a simulation in this process, a served robot, one at ur://, or logs."""
 
 import asyncio
 import sys
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 ROBOT = "ur5e"  # robot that is identified unless another one is named
 READY = 30.0  # longest wait for the robot to follow set-points [s]
 MOVED = 0.01
-"""If a joint is further than this from where the moves were planned to start, they are not made [rad]."""
+"""Largest distance of a joint from the start of the planned moves [rad]; beyond it, nothing moves."""
 
 
 def from_logs(
@@ -81,7 +81,7 @@ def _calibrated(arm: RobotDescription, measured: RingDownLogs, output: Path, ste
 
 
 class MovableRobot:
-    """A robot that can be moved: served, at ur://, or in this process if there is no source."""
+    """A robot that can be moved: a served one, one at ur://, or if there is no source one in this process."""
 
     def __init__(
         self,
@@ -112,7 +112,7 @@ class MovableRobot:
             content = {
                 "robot": robot or ROBOT,
                 "payload": None if masses is None else max(masses),
-                "overload": True,  # refused below, without the hint for who serves
+                "overload": True,  # accepted here; refused below with another message
                 "calibration": "none",
                 "clock": "free",
                 "seed": seed,
@@ -195,7 +195,7 @@ class MovableRobot:
 
 
 def _robot_file(robot: str | None, models: set[str], what: str) -> RobotDescription:
-    """Return the robot file of this name or path, or else the one that comes with the package for a model."""
+    """Load the robot file `robot` (name or path), or if that is None the package's file for the only model."""
     if robot is None:
         fitting = [name for name in robots() if load(name).robot.model in models]
         if len(models) != 1 or len(fitting) != 1:
@@ -225,7 +225,7 @@ def _robot_logs(
 
 
 def _figures(found: Found, arm: RobotDescription, true: list[ModeErrors] | None) -> "dict[str, Figure]":
-    """Draw the measured modes and, if the truth is known, maps of the lowest one over the workspace."""
+    """Draw the measured modes; if the truth is known, also maps of the lowest mode over the workspace."""
     from tvist_lab.figures import identified_figure, workspace_map_figure
     from tvist_lab.identification.workspace_map import QUANTITIES, workspace_map
 
@@ -260,7 +260,7 @@ async def _agreed_jogs(
         await _ready(client, control, plan)
         try:
             return await make_jogs(client, control, plan, step)
-        except (RefusedError, MotionStoppedError) as error:  # the stop says why, what came after it does not
+        except (RefusedError, MotionStoppedError) as error:  # a stop before it is the reason
             raise Failure(f"the moves were not finished: {stops[-1] if stops else error}") from error
 
 

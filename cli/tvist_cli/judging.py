@@ -17,7 +17,7 @@ LEAST_TRUTH_SHARE = 0.8
 
 
 def judge(without: "MotionRecord", shaped: "MotionRecord") -> "Verdict":
-    """Measure one motion without and with a shaper, each with the rest after it; missing values are None."""
+    """Compare a motion without and with a shaper, each recorded until after its end; unknown values are None."""
     from tvist_lab.metrics.comparison import MotionChange, compare
     from tvist_lab.metrics.table import MeasuredRecording
 
@@ -34,7 +34,7 @@ def _recording(run: "MotionRecord") -> "Recording":
     truths = sorted(run.truths, key=lambda truth: truth.tick)
     if len(truths) < LEAST_TRUTH_SHARE * len(run.states):
         return recording_of_messages(run.states, run.events)
-    # At both ends, the truth of a state may be missing.
+    # The first and last states may lack a truth message.
     states = [state for state in run.states if truths[0].tick <= state.tick <= truths[-1].tick]
     between = [truth for first, second in pairwise(truths) for truth in _between(first, second)]
     return recording_of_messages(
@@ -43,7 +43,7 @@ def _recording(run: "MotionRecord") -> "Recording":
 
 
 def _between(first: "Truth", second: "Truth") -> "Iterator[Truth]":
-    """Interpolate the truth messages lost between two: |α| falls steeply at a stop, so a gap would show."""
+    """Interpolate lost truth messages between two: a gap where the acceleration falls steeply would distort it."""
     for tick in range(first.tick + 1, second.tick):
         share = (tick - first.tick) / (second.tick - first.tick)
         mixed = {

@@ -32,9 +32,9 @@ class LogOptions:
     path of a robot file [that of the log, or ur5e]."""
 
     def read(self, *files: Path, sensor: bool = False) -> "list[Recording]":
-        """Read logs and join each with its sensor's log; RecordingError or Misuse if one does not fit.
+        """Read logs, and join each with the log of its sensor; RecordingError or Misuse if a log does not fit.
 
-        If `sensor` is true, a log without `--imu` may be that of an accelerometer alone.
+        If `sensor` is true and `--imu` is not given, a log may be of an accelerometer alone.
         """
         from tvist_lab.recordings import read
         from tvist_lab.recordings.table import ROBOT, ROBOT_OR_SENSOR

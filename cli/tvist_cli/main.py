@@ -88,7 +88,7 @@ def _default(value: object) -> str | None:
 def application(called: Sequence[str] = ()) -> "cyclopts.App":
     """Return the parser for all commands and options.
 
-    Of the command `called`, given as its words, the help is its docstring; the others have their one-line help.
+    The help of the command `called` (its words) is its docstring; other commands only have their one-line help.
     """
     from importlib.metadata import version
 
@@ -105,7 +105,7 @@ def application(called: Sequence[str] = ()) -> "cyclopts.App":
         help_formatter=HelpBoxes(),
         default_parameter=cyclopts.Parameter(negative=(), validator=finite, show_default=_default),
         config=check_whole,
-        suppress_keyboard_interrupt=False,  # `main` says that it was interrupted
+        suppress_keyboard_interrupt=False,  # `main` reports the interruption
     )
     _add(app, "tvist_cli.commands", COMMANDS, called[:1])
     for name, commands in OF_GROUPS.items():
@@ -153,7 +153,7 @@ def _add(app: "cyclopts.App", package: str, commands: Mapping[str, str], called:
 
 def _run() -> None:
     if sys.argv[1:2] == ["serve"] and "--compile" not in sys.argv:
-        gc.disable()  # `serve` switches it on again: what is imported until then lives until the end
+        gc.disable()  # imported objects live until the end; `serve` switches the collector on again
         # Nothing is served yet, so a signal can end the process at once. As the first process of a container,
         # it has no default action for signals.
         for number in ending_signals():
@@ -164,10 +164,10 @@ def _run() -> None:
     if sys.argv[1:] in (["--help"], ["-h"]):
         try:
             print(_overview(), flush=True)
-        except BrokenPipeError:  # the reader has seen enough
+        except BrokenPipeError:  # the reader of the output has closed it
             os._exit(1)
         return
-    # The matrices are small: threads for them would only slow down each other and the control loop.
+    # The matrices are small: threads for them would slow down each other and the control loop.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         import cyclopts
@@ -183,7 +183,7 @@ def _run() -> None:
     warnings.formatwarning = lambda message, *_, **__: harmless(f"tvist: {message}\n")
     app = application(sys.argv[1:3])
     try:
-        with failing_on(OSError):  # what no command gives another exit code
+        with failing_on(OSError):  # errors that the command itself does not handle
             app(readable(sys.argv[1:]), exit_on_error=False, print_error=False)
     except cyclopts.CycloptsError as error:
         group = (error.command_chain or ("",))[0]

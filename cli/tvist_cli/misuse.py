@@ -26,7 +26,7 @@ _KINDS: dict[object, str] = {int: "a whole number", float: "a number", bool: "tr
 
 
 def readable(arguments: Iterable[str]) -> list[str]:
-    """Put a blank before arguments that begin with a minus but are no options: angles, and `-` for standard input."""
+    """Put a space before arguments that begin with a minus but are no options: angles, and `-` for standard input."""
     return [
         f" {argument}" if argument == "-" or _ANGLES.fullmatch(argument) else argument
         for argument in arguments
@@ -39,13 +39,13 @@ def lower(name: str | None) -> str | None:
 
 
 def check_whole(_app: Any, _commands: Any, arguments: "ArgumentCollection") -> None:
-    """Refuse fractions for whole numbers; the parser would round them."""
+    """Refuse fractions where whole numbers are expected, because the parser would round them."""
     for argument in arguments:
         parts = (argument.hint, *get_args(argument.hint))
         if int not in (*parts, *(one for part in parts for one in get_args(part))):
             continue
         for token in argument.tokens:
-            if token.value and not _WHOLE.fullmatch(token.value):  # without a value, an option may take none
+            if token.value and not _WHOLE.fullmatch(token.value):  # empty: the option needs no value
                 raise CoercionError(token=token, argument=argument, target_type=int)
 
 
@@ -56,7 +56,7 @@ def finite(_: Any, value: Any) -> None:
 
 
 def message_of(error: CycloptsError, commands: Sequence[str]) -> str:
-    """Return a message for a parser's error; `commands` are the names that were possible at its place."""
+    """Return a message for a parser's error; `commands` are the names of commands that were possible there."""
     command = " ".join(["tvist", *(error.command_chain or ())])
     seek = f"see {command} --help"
     match error:

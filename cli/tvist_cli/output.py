@@ -47,12 +47,12 @@ def say(message: str) -> None:
     try:
         err.print(message, soft_wrap=True)
     except OSError:
-        # The terminal is closed. Without this, the unwritten rest would fail again when the process ends.
+        # The terminal is closed. Without this, writing the rest would fail again when the process ends.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stderr.fileno())
 
 
 def program() -> str:
-    """Return what to type in this folder to call this program: its name if the shell finds it, else its path."""
+    """Return how to call this program from this folder: by its name if the shell finds that, else by its path."""
     here, found = Path(sys.executable).with_name("tvist"), shutil.which("tvist")
     if not here.exists() or (found is not None and Path(found).samefile(here)):
         return "tvist"
@@ -61,7 +61,7 @@ def program() -> str:
 
 
 def typed() -> str:
-    """Return the command as it was typed, for pages that name the command that made them."""
+    """Return the command line as it was typed, for pages that show how they were made."""
     return shlex.join(["tvist", *sys.argv[1:]])
 
 
@@ -92,7 +92,7 @@ def waiting(what: str) -> Iterator[Callable[[str], None]]:
 
 @contextmanager
 def progress(total: int, what: str, kept: str = "nothing was written") -> Iterator[Callable[..., None]]:
-    """Show a progress bar on a terminal; yield a function that advances it and may rename it.
+    """Show a progress bar on a terminal; yield a function that advances the bar and may rename it.
 
     `what` names the steps in the plural; `kept` tells what remains after Control+C.
     """
@@ -137,7 +137,7 @@ def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], on:
 
 
 def _parts(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> list[list[int]]:
-    """Distribute the columns over the parts of a table so that none is wider than the screen."""
+    """Distribute a table's columns over parts that are no wider than the screen; each begins with column 0."""
     wide = [
         max(cell_len(line) for cell in cells for line in cell.split("\n")) + len(GAP)
         for cells in zip(columns, *rows, strict=True)
@@ -175,7 +175,7 @@ def write_json(path: Path, result: dict[str, Any]) -> None:
 
 
 def default_output(path: Path) -> Path:
-    """Return the default path of a file; raise Failure if it exists, since only a file the user named is replaced."""
+    """Return a default path; Failure if the file exists, since only files that the user has named are replaced."""
     if path.exists():
         raise Failure(f"{path} exists already: choose the file with --output, which replaces what is there")
     return path
@@ -186,5 +186,5 @@ def write_report(path: Path, page: "ReportPage") -> None:
     from tvist_lab.report import render
     from tvist_lab.whole_file import write_whole
 
-    write_whole(path, render(page).encode(errors="replace"))  # a file's name need not be text
+    write_whole(path, render(page).encode(errors="replace"))  # a file name may have bytes that are no text
     say(f"the report is in {path}")

@@ -60,7 +60,7 @@ def read_script(file: Path, skip: Sequence[str] = ()) -> str:
 
 
 def programs_in(files: Sequence[Path]) -> list[Path]:
-    """Return files, with folders replaced by their programs; of one saved by PolyScope, its own export is left out."""
+    """Replace folders by their programs, without scripts that PolyScope has exported beside programs it saved."""
     found: list[Path] = []
     for file in files:
         inside = sorted(file.rglob("*")) if file.is_dir() else [file]
@@ -72,7 +72,7 @@ def programs_in(files: Sequence[Path]) -> list[Path]:
 
 
 def read_scripts(files: Sequence[Path], skip: Sequence[str]) -> list[str | Failure]:
-    """Read programs; of several, one that cannot be read is its failure, and keeps no other from running."""
+    """Read programs. If there are several, return the Failure of each unreadable one, so that the others can run."""
     found: list[str | Failure] = []
     for file in files:
         try:
@@ -117,7 +117,7 @@ def check_scripts(files: Sequence[Path], skip: Sequence[str], *, json: bool) -> 
 
 
 def _findings(text: str | Failure) -> list[ProgramFinding]:
-    """Check a program; one that was not read has an error in its first line."""
+    """Check a program. A program that could not be read gets an error in its first line."""
     return check_program(text) if isinstance(text, str) else [ProgramFinding(1, 1, "error", str(text))]
 
 
@@ -132,7 +132,7 @@ class ProgramOutcome:
 
 
 class ProgramConsole:
-    """Prints a program's messages as they come, and on a terminal a progress line; `quiet` suppresses the messages."""
+    """Prints messages of programs as they come (unless `quiet`), and on a terminal a line with the progress."""
 
     def __init__(self, *, quiet: bool) -> None:
         self._quiet = quiet
@@ -187,7 +187,7 @@ class Runner:
     tell: ProgramConsole
 
     def run(self, file: Path, text: str | Failure) -> ProgramOutcome:
-        """Run a program, unless it does not compile or was not read."""
+        """Run a program if it was read and compiles."""
         if isinstance(text, Failure):
             why = asdict(Shortcoming("refused", str(text)))
             result = {"file": named(file), "ok": False, "exit_reason": "refused", "failures": [why]}
@@ -254,7 +254,7 @@ class Runner:
 
 
 def _refused(file: Path, text: str) -> ProgramOutcome | None:
-    """Print what is wrong with a program before anything starts; None if it can run."""
+    """Print a program's errors and warnings before anything starts; return the outcome of one that cannot run."""
     findings = check_program(text)
     for finding in findings:
         say(placed(file, finding))
@@ -269,7 +269,7 @@ def _refused(file: Path, text: str) -> ProgramOutcome | None:
 
 
 def _ended(watch: ProgramWatch, errors: list[str]) -> list[Shortcoming]:
-    """Return failures other than those of limits and baseline: of the program, or of its recording."""
+    """Return the failures of the program and its recording; limits and baseline are judged elsewhere."""
     found = [Shortcoming("recording", error) for error in errors]
     if watch.reason != "finished":
         line = None if watch.error is None else watch.error.line

@@ -40,17 +40,17 @@ _BOX_OF = {
 }
 _OFFERED = {"robot": ROBOTS, "robots": ROBOTS, "shaper": SHAPERS, "plant": PLANTS, "world": WORLDS,
             "profile": PROFILES}  # fmt: skip
-"""Completion of option values."""
+"""Values for shell completion, by option."""
 _READ_AS: dict[type, Any] = {
     types.BoolType: bool, types.IntType: int, types.FloatType: float, types.VarTupleType: list[str],
     types.StructType: list[str],
 }  # fmt: skip
-"""Types of option values by those of the fields; the others are texts."""
+"""Type as which an option is parsed, by the type of its field; all others are parsed as text."""
 _IN_ANY_CASE = ("profile", "shaper", "clock")
 
 
 def with_robot_options(only: Collection[str] = ()) -> Callable[[Command], Command]:
-    """Give a command whose last parameter is `**given` the fields of `ServeOptions`, or `only` some, as options."""
+    """Give a command options for the fields of `ServeOptions`, or `only` some. Its last parameter must be `**given`."""
 
     def decorate(command: Command) -> Command:
         signature = inspect.signature(command)
@@ -64,7 +64,7 @@ def with_robot_options(only: Collection[str] = ()) -> Callable[[Command], Comman
 
 
 def configuration(given: Mapping[str, Any], file: str | None, **defaults: object) -> "ServeConfig":
-    """Merge command line, file and `defaults`, in this order of precedence; StartError if a value is invalid."""
+    """Merge options: the command line overrides the file, which overrides `defaults`. StartError if one is invalid."""
     from tvist_server.config import from_mapping
 
     source = "configuration" if file is None else f"configuration {file}"
@@ -89,7 +89,7 @@ def _option(field: FieldInfo) -> inspect.Parameter:
 
 
 def _help(field: FieldInfo) -> str:
-    """Return a field's docstring, with the default where a word can express it."""
+    """Return a field's docstring; if the default is a number or a word, append it."""
     text, default = field_docs(ServeOptions)[field.name], field.default
     if isinstance(default, bool) or not isinstance(default, str | int | float):
         return text

@@ -73,7 +73,7 @@ def run_programs(
 
 
 def _run_all(runner: Runner, files: Sequence[Path], texts: Sequence[str | Failure]) -> list[ProgramOutcome]:
-    """Run programs one after the other; if there are several, print at once how each ended."""
+    """Run programs one after the other; if there are several, print how each ended as soon as it ends."""
     ran: list[ProgramOutcome] = []
     several = len(files) > 1
     for number, (file, text) in enumerate(zip(files, texts, strict=True), 1):
@@ -88,7 +88,7 @@ def _run_all(runner: Runner, files: Sequence[Path], texts: Sequence[str | Failur
 
 
 def _of_several(ran: Sequence[ProgramOutcome], count: int) -> Failure | None:
-    """Return why the runs of several programs failed; None if none failed."""
+    """Return the common failure of several programs' runs; None if no run failed."""
     failed = {one.result["file"]: one.failure for one in ran if one.failure is not None}
     if not failed:
         return None
@@ -128,7 +128,7 @@ def _baseline(path: Path, files: Sequence[Path], *, lockstep: bool) -> Mapping[s
 
 
 def _configuration(given: dict[str, Any], file: str | None, *, lockstep: bool) -> ServeConfig:
-    """Return the configuration of the robot, as of `tvist serve` for one robot with the profile `ursim`."""
+    """Return the robot's configuration: as for `tvist serve` with one robot and the profile `ursim`."""
     for name in ("listen", "ur", "ur_allow"):
         if lockstep and name in given:
             option = name.replace("_", "-")

@@ -44,7 +44,7 @@ def serve_robots(config: ServeConfig) -> None:
 
 
 def compile_all(processes: int | None = None) -> None:
-    """Compile ahead in this number of processes."""
+    """Compile all kernels in advance, in this number of processes."""
     check_range("compile", processes, 1)
     compile_shown(processes)
     say(f"everything is compiled, after {time.monotonic() - BEGAN:.0f} s")
@@ -73,7 +73,7 @@ def _say_ready(setups: Sequence[Setup], config: ServeConfig) -> None:
 
 
 def introduction(setups: Sequence[Setup], profile: str | None) -> str:
-    """Describe what listens: one robot with its settings, or the names of several."""
+    """Return the first message of a server: one robot with its settings, or the names of several robots."""
     first = setups[0]
     how = f"shaper {first.shaper}" + ("" if profile is None else f", profile {profile}")
     if len(setups) == 1:
@@ -85,7 +85,7 @@ def introduction(setups: Sequence[Setup], profile: str | None) -> str:
 
 
 def say_who_can_reach(server: Server | Workers, config: ServeConfig, robots: int) -> None:
-    """Print where UR's interfaces are open, and where anyone can move the robots."""
+    """Print the addresses of UR's interfaces, and those at which anyone can move the robots."""
     for address, ports in server.ur:
         listed = ", ".join(f"{interface} {port}" for interface, port in ports.items())
         say(f"UR's interfaces are open on {address}: {listed}")
@@ -106,7 +106,7 @@ def say_recorded(recordings: Sequence[RecordingResult]) -> list[str]:
 
 
 def leave(server: Server, code: int) -> None:
-    """End the process with an exit code if the network would keep it; everything else is closed by then."""
+    """If the network would keep the process running, end it with an exit code; all else is already closed."""
     # Zenoh would wait ten seconds for a client that has stopped reading.
     if not server.left:
         os._exit(code)

@@ -29,7 +29,7 @@ def load_given(place: str) -> "OwnShaper":
 
 
 def of_impulses(shaper: str) -> "Shaper":
-    """Return the impulse shaper of a name or FILE.py:NAME; others have no delay for a given mode and are refused."""
+    """Load an impulse shaper by name or FILE.py:NAME. Refuse others: their delay does not follow from a mode."""
     from tvist_shaping import SHAPERS, Shaper
 
     name, own = loaded(shaper)

@@ -38,7 +38,7 @@ from tvist_shaping.errors import ShapingError
 
 Shaper = str | OwnShaper
 OF_SHAPERS = (CalibrationError, RecipeError, RefusalError, ShapingError)
-"""Errors if a shaper cannot be made from a calibration for an arm."""
+"""Errors that are raised if a shaper cannot be made for an arm with a calibration."""
 
 
 def preset_study(name: str, options: StudyOptions) -> Study:
@@ -90,7 +90,7 @@ def _check(options: StudyOptions) -> None:
 def _asked(
     preset: Preset, name: str, options: StudyOptions, other: str = "", moves: Sequence[Move] = ()
 ) -> StudyRequest:
-    """Load what the options request; for an `other` robot, with its own calibration and the given moves."""
+    """Load what the options request. `other`: for this robot instead, with its own calibration and these moves."""
     whole = load(other or options.robot)
     masses = _masses(options.payload, whole)
     wanted = "none" if options.clean else options.disturbances
@@ -113,7 +113,7 @@ def _asked(
     if preset.always:
         always += some(preset.always, description, _calibration(given, "", 1, description, modal=True))
     methods = {one.name: one for one in (*always, *named, *others)}
-    for one in methods.values():  # an error here comes before anything is computed
+    for one in methods.values():  # raises errors before anything is computed
         if isinstance(one, Named):
             one.recipe.elastic(description, one.recipe.make(description, masses[1]))
     moves, share = (moves, None) if other else _moves(options, whole, masses, preset.least)
@@ -143,7 +143,7 @@ def _asked(
 
 
 def _shaper(name: str) -> Shaper:
-    """Return a shaper name in lower case, the path of a file with a shaper, or a loaded shaper."""
+    """Convert a shaper given by the user to a name in lower case, the path of its file, or a loaded shaper."""
     if ".py:" in name:
         return load_given(name)
     if not name.endswith(".py"):
@@ -155,7 +155,7 @@ def _shaper(name: str) -> Shaper:
 def _calibration(
     given: str | None, shaper: Shaper, modes: int, description: RobotDescription, *, modal: bool
 ) -> Calibration | None:
-    """Return the given calibration, or the robot's own: a modal one for several modes."""
+    """Return the calibration named `given`, or else the robot's own, which for several modes is a modal one."""
     own = (shaper,) if isinstance(shaper, OwnShaper) else ()
     name = shaper.name if isinstance(shaper, OwnShaper) else shaper
     known = Registry(one.shaper for one in own)
@@ -163,7 +163,7 @@ def _calibration(
         several = (
             modal or wanted_modes(name, modes, "shaper", known) > 1 or known.feed_forward_of(name) != "rigid"
         )
-    except RefusalError:  # not a shaper of the library; `some` refuses an unknown name
+    except RefusalError:  # not a shaper of the library; `some` reports unknown names
         several = modal = True
     if given is not None:
         found = calibrations.load(given)
@@ -198,7 +198,7 @@ def _masses(payload: Sequence[float] | None, description: RobotDescription) -> t
 def _moves(
     options: StudyOptions, description: RobotDescription, masses: tuple[float, float], least: int
 ) -> tuple[list[Move], float | None]:
-    """Return the moves, and the share of random draws that were free of collision."""
+    """Return the moves, and the share of randomly drawn ones without collision (None: read from a file)."""
     if not options.moves.lstrip("-").isdigit():
         drawn = np.random.default_rng(options.seed)
         return read_moves(Path(options.moves), description, lambda: float(drawn.uniform(*masses))), None
@@ -211,7 +211,7 @@ def _moves(
 
 
 def _arms(options: StudyOptions, description: RobotDescription) -> list[Variant]:
-    """Return the named plants, the hidden robots of these seeds, and the arm with changed springs."""
+    """Return the requested plants: by name, hidden robots by seed, and an arm with changed springs."""
     for seed in options.hidden or ():
         check_seed(seed)
     with failing_on(ValueError, exit_code=2):
@@ -220,10 +220,10 @@ def _arms(options: StudyOptions, description: RobotDescription) -> list[Variant]
             *map(hidden_variant, options.hidden or ()),
         ]
         for one in found:
-            one.make(description, description.payload, 0)  # says what this arm cannot be
+            one.make(description, description.payload, 0)  # raises if the plant does not suit this arm
     if options.stiffness_error:
         found.append(scattered(0.01 * options.stiffness_error))
-    return list({one.name: one for one in found}.values())  # one that is named twice counts once
+    return list({one.name: one for one in found}.values())  # a plant that is named twice counts once
 
 
 def _notes(
@@ -254,7 +254,7 @@ def _notes(
 
 
 def _command(name: str, options: StudyOptions) -> str:
-    """Return the command that reproduces the figures."""
+    """Return the command line that reproduces the study."""
     words = ["tvist study", name]
     for option, value in options.given.items():
         if option != "save_moves":

@@ -43,7 +43,7 @@ def run(
     scheduler: str | None,
     json: bool,
 ) -> None:
-    """Run a study by name or from a file; raise Failure if an option is invalid, it cannot run, or rows failed."""
+    """Run a study, given by name or file; Failure if an option is invalid, the study cannot run, or rows failed."""
     executor = _executor(processes, scheduler)
     look.check(figures, report, options.save_moves)
     if file is None:
@@ -126,7 +126,7 @@ def _ran(
 
 
 def _tell(result: Result, *, json: bool) -> None:
-    """Print a finished study as one JSON object or as tables, and what was not measured."""
+    """Print a finished study as one JSON object, or as tables with a list of what was not measured."""
     values, rows = result.values, result.rows
     if json:
         print_json(values)

@@ -1,4 +1,4 @@
-"""Functions shared by commands with studies: check seeds, print results."""
+"""Functions shared by commands that run studies: they check seeds and print results."""
 
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any

@@ -1,4 +1,4 @@
-"""Recordings and simulated motions as tracks for a page to play back."""
+"""Converts recordings and simulated motions to tracks, which a page plays back."""
 
 import asyncio
 from collections.abc import Sequence
@@ -57,7 +57,7 @@ def recorded(file: Path) -> Shows:
 
 
 def repeated(file: Path) -> Shows:
-    """Return the recorded motion without and with the shaper that brings the tool to rest the most earlier."""
+    """Return the recorded pair of motions, without and with a shaper, whose times to rest differ most."""
     with failing_on(ValueError):
         content = read_checked(file)
         measured = MeasuredRecording.of(content.recording)
@@ -74,7 +74,7 @@ def repeated(file: Path) -> Shows:
             motion = measured.motions[place]
             before = slice(max(motion.start - LEAD, 0), motion.start + 1)
             way = np.abs(np.diff(content.recording["reference_q"][before], axis=0)).max(axis=1)
-            set_elsewhere = np.flatnonzero(way > 0.0)  # as by a reset
+            set_elsewhere = np.flatnonzero(way > 0.0)  # the arm was put elsewhere, as by a reset
             first = int(ticks[before][set_elsewhere[-1] + 1 if len(set_elsewhere) else 0])
             last = min(int(ticks[motion.reference_stop]) + REST, int(ticks[motion.end - 1]))
             states = [state for state in content.states if first <= state.tick <= last]
@@ -101,7 +101,7 @@ def compared(shapers: Sequence[str], robot: str) -> Shows:
         first, last = named[0]
         for shaper in shapers:
             info, collected = asyncio.run(run_beside(shaper, (poses[first], poses[last]), robot=robot))
-            assert info.geometry is not None  # of our own server
+            assert info.geometry is not None  # this process's server sends it
             label = "without" if shaper == "none" else f"with {shaper}" if "none" in shapers else shaper
             look = Look(info.geometry, info.payload)
             tracks.append(Track(label, look, collected.states, collected.truths))
@@ -114,7 +114,7 @@ def compared(shapers: Sequence[str], robot: str) -> Shows:
 
 
 def _look_of(content: RecordingFile) -> Look:
-    """Return the geometry of a recording's robot: as recorded, or from the robot file in a server's recording."""
+    """Return how to draw a recording's robot: as recorded, or by the robot file that a server has recorded."""
     info, start = content.info, content.start or {}
     if info is not None and info.geometry is not None:
         return Look(info.geometry, info.payload)

@@ -39,7 +39,7 @@ def ask(session: zenoh.Session, leaf: str, **message: object) -> dict[str, Any]:
 
 
 def swing(t: float) -> float:
-    """Offset of the base joint at a time [rad]: a sine that fades in over the first second and out over the last."""
+    """Return the offset of the base joint at time t [rad]: a sine, faded in and out over one second each."""
     fade = math.sin(math.pi / 2 * min(1.0, t, SECONDS - t)) ** 2
     return AMPLITUDE * fade * math.sin(2 * math.pi * FREQUENCY * t)
 
@@ -73,7 +73,7 @@ def main() -> None:
         session = zenoh.open(config)
     except zenoh.ZError:
         sys.exit(f"nobody listens at {ENDPOINT}: does the server run?")
-    with session:  # closes it, since an open session can keep the process from ending
+    with session:  # an open session could keep the process from ending
         info = ask(session, "info")
         if info["clock"] != "realtime":
             sys.exit(f"this example needs a robot in real time; {ROBOT} is in {info['clock']}")
@@ -92,8 +92,8 @@ def main() -> None:
             state: dict[str, Any] = msgpack.unpackb(inbox.get(timeout=5.0))
             return state
 
-        # With this token the robot notices if this program dies, and ends its control at once. The session's id
-        # distinguishes it from another program with the same client name.
+        # If this program dies, this token disappears, and the robot ends its control at once. The session's id
+        # distinguishes this program from another one with the same client name.
         alive = session.liveliness().declare_token(f"tvist/{ROBOT}/client/bare/{session.info.zid()}")
         token = ask(session, "command", type="take_control", client="bare", lease_s=30.0)["token"]
         q = next_state()["target_q"]
@@ -117,7 +117,7 @@ def main() -> None:
         alive.undeclare()  # type: ignore[no-untyped-call]
 
     lag = delay([s["reference_q"][0] for s in states], [s["target_q"][0] for s in states])
-    still = states[0]["actual_tool_accelerometer"]  # gravity, which a rotation of the base does not change
+    still = states[0]["actual_tool_accelerometer"]  # gravity only: a rotation of the base does not change it
     joint = max(abs(qdd) for s in states for qdd in s["target_qdd"])
     tool = max(math.dist(s["actual_tool_accelerometer"], still) for s in states)
     print(f"round trip              {trip:6.2f} ms, median; {answer:.2f} ms where the robot answers")

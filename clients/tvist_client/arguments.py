@@ -1,4 +1,4 @@
-"""Builds messages from users' arguments; the types of the messages' fields say what is allowed."""
+"""Builds messages from users' arguments, which are checked against the types of the messages' fields."""
 
 from collections.abc import Iterable, Mapping
 from decimal import Decimal
@@ -25,7 +25,7 @@ class Argument(NamedTuple):
     """A field of a message that users pass."""
 
     field: FieldInfo
-    kind: Any  # its type in users' programs
+    kind: Any  # type of the argument in users' programs
 
 
 @cache
@@ -62,7 +62,7 @@ def make_payload(mass: float, com: Iterable[float], inertia: Iterable[float]) ->
 
 
 def _plain(value: Any, name: str, hint: Any) -> Any:
-    """Convert a value to plain numbers, strings and lists, with a list for one mode and True for a switch that is 1."""
+    """Convert a value to numbers, strings and lists; one frequency or ratio becomes a list, 1 for a bool True."""
     try:
         plain = msgspec.to_builtins(value, builtin_types=(bytes, bytearray, Decimal), enc_hook=_builtin)
     except (TypeError, RecursionError, OverflowError) as error:
@@ -78,7 +78,7 @@ def _plain(value: Any, name: str, hint: Any) -> Any:
 
 
 def _builtin(value: Any) -> Any:
-    """Convert what is not Python's own: arrays and numbers of numpy, other numbers, and iterators."""
+    """Convert values that are not Python's own: numpy's arrays and numbers, other numbers, and iterators."""
     plain = value.tolist() if hasattr(value, "tolist") else value
     if type(plain) is not type(value):
         return plain
@@ -90,7 +90,7 @@ def _switch(value: Any) -> Any:
 
 
 def _kind(hint: Any) -> Any:
-    """Return the type in users' programs of a field of this type."""
+    """Return the type that users' programs may give for a field of type `hint`."""
     if hint in {Frequencies, DampingRatios}:
         return float | Iterable[float]
     hint = get_args(hint)[0] if get_origin(hint) is Annotated else hint

@@ -25,9 +25,9 @@ TELEMETRY_S = 3.0  # longest wait for telemetry, which comes once a second [s]
 ON_TIME = 0.9  # smallest share of the due states that counts as the full rate [-]
 TOO_SLOW = 0.5  # share of the due ticks below which the robot is overloaded, whatever its telemetry says [-]
 LONG_US = 20_000.0
-"""Lateness of a tick that is reported if its thread has waited as long for a processor [µs]."""
+"""Lateness above which a tick is reported [µs], if its thread waited for a processor at least half as long."""
 RETRY_S = 0.5  # time between two attempts while a robot is starting [s]
-STALE = "check"  # a token that belongs to no lease
+STALE = "check"  # a token that no lease has
 
 
 class CheckResult(msgspec.Struct, frozen=True):
@@ -48,7 +48,7 @@ class CheckReport(msgspec.Struct):
     protocol: int | None = None  # version of the protocol that the robot uses; null if it did not answer
     state_rate_hz: float | None = None
     """States received per second of this machine's clock [Hz]; null in lockstep, or if no state came."""
-    findings: list[CheckResult] = []  # one result per step; a step that fails is the last one
+    findings: list[CheckResult] = []  # one result per step; if a step fails, no further step is made
     ready: bool | None = None  # whether the robot may be moved; null if that was not checked
     robot_mode: str | None = None  # RTDE name of the robot mode; null if it was not checked or is unknown
     safety_mode: str | None = None  # RTDE name of the safety mode; null if it was not checked or is unknown
@@ -97,7 +97,7 @@ class _Check:
         self.report = CheckReport(ok=False, endpoint=endpoint, robot=name or "")
         self.robot: Robot
         self.missed = ""  # how many control periods were missed
-        self.early = False  # whether the robot may appear later
+        self.early = False  # whether the check came too early: the robot may appear later
 
     async def run(self) -> CheckReport:
         report, step = self.report, "connect"
@@ -206,7 +206,7 @@ class _Check:
         return f"robot_mode {found.robot_mode}, safety_mode {found.safety_mode}"
 
     async def load(self) -> str:
-        report = self.report  # `state` has measured it
+        report = self.report  # the step `state` has measured this
         if report.overloaded is None:
             return "unknown: a client steps the time, or the server is older"
         if report.overloaded:
@@ -216,7 +216,7 @@ class _Check:
 
 
 def _remedy(last: Telemetry | None, due: float) -> str:
-    """Return the remedy for a low rate of states, which the robot or the network causes."""
+    """Return the remedy for a low rate of states; it depends on whether the robot or the network is the cause."""
     if last is not None and last.ticks_per_second >= ON_TIME * due:
         return (
             f": the robot itself makes {last.ticks_per_second:.0f} ticks/s; next, look at the network and at the "
@@ -226,7 +226,7 @@ def _remedy(last: Telemetry | None, due: float) -> str:
 
 
 def _doubt(calibration: CalibrationInfo | None) -> str:
-    """Return a warning about the calibration in use; empty if it is in order."""
+    """Return a warning about the calibration in use; empty if the calibration is in order."""
     if calibration is not None and calibration.fits_arm is False:
         return f"; calibration {calibration.name!r} was measured on a different arm: the frequencies will be wrong"
     if calibration is not None and not calibration.fits_payload:

@@ -22,11 +22,11 @@ from tvist_protocol.schema import field_docs
 TICK = 0.002  # control period [s]
 Answer = Accepted | Done | Posture | ToolPose  # replies to a command that was not refused
 _ANSWER = re.compile(r"; (it is )?answered (as|by) [^.]*")
-"""Part of a message's description about its answer, which is the method's result."""
+"""Part of a message's description that is about the answer; users get the method's result instead."""
 
 
 class Commanded(Protocol):
-    """What a command needs of a robot."""
+    """The methods of a robot that commands use."""
 
     motions: MotionsByNumber
 
@@ -44,7 +44,7 @@ class Commanded(Protocol):
 
 
 class Leased:
-    """A right on a robot, proved by its token."""
+    """Control or the clock of a robot, a right that is proved by a token."""
 
     robot: Commanded
     token: str
@@ -52,7 +52,7 @@ class Leased:
 
 
 class Described:
-    """An attribute that is a method to callers and to `help`; its docstring is built on request."""
+    """An attribute that acts as a method; its docstring is built when `help` asks for it."""
 
     __name__: str
 
@@ -70,14 +70,14 @@ class Sent(Described):
     def __init__(
         self,
         kind: type[Struct],
-        carry_out: Callable[..., Awaitable[Any]],  # sends it; its further arguments are the method's, too
+        carry_out: Callable[..., Awaitable[Any]],  # sends it; its other arguments become the method's
         positional: int | None = None,  # number of positional arguments
         returns: Any = None,  # type of the result, if `carry_out` does not annotate it
     ) -> None:
         self._kind, self._carry_out, self._positional, self._returns = kind, carry_out, positional, returns
 
     def __call__(self, owner: Any, *values: Any, **named: Any) -> Coroutine[Any, Any, Any]:
-        """Return a coroutine that sends the command, named after this method for Python's warnings."""
+        """Return a coroutine that sends the command; it has this method's name, which Python's warnings show."""
         try:
             given = self.__signature__.bind(owner, *values, **named).arguments
         except TypeError as error:
@@ -110,7 +110,7 @@ class Sent(Described):
         return Signature([*found, *self._extra.values()], return_annotation=returned)
 
     def _description(self) -> str:
-        """Return the docstring, from those of the message, its fields and `carry_out`, and the errors."""
+        """Return a docstring composed of those of the message, its fields and `carry_out`, and the errors."""
         docs, taken, extra = field_docs(self._kind), arguments(self._kind), self._extra
         lines = [f"{name}: {docs[name]}" for name in taken] + [f"{name}: {_EXTRA[name]}" for name in extra]
         errors = ["RefusedError: The robot refused it, which changed nothing."]
@@ -128,7 +128,7 @@ class Sent(Described):
 
 
 def asking(kind: type[Struct], answer: type[Struct], positional: int | None = None) -> Sent:
-    """Return a method that asks a robot, and returns the only field of the answer."""
+    """Return a method that sends a question and returns the only field of the answer."""
     (name,) = answer.__struct_fields__
 
     async def ask(robot: Commanded, command: Command) -> Any:

@@ -23,7 +23,7 @@ from tvist_protocol.stream import Event, State, Telemetry, Truth
 
 BUFFER = 5000  # number of messages that an iterator buffers: 10 s of states
 ANSWER_S = 10.0  # longest wait for the answer to a command [s]
-STATE_S = 5.0  # longest pause between two states [s]; in lockstep the last one is repeated every second
+STATE_S = 5.0  # longest pause between two states [s]; in lockstep the last state is repeated every second
 CHUNK = 50  # ticks to step between two checks whether a motion has ended: 0.1 s
 MAX_STEP = 1000
 """Largest number of set-points in one `simulation.step`, and of ticks that every server accepts at once."""
@@ -87,7 +87,7 @@ class Connection(Questions):
         return self._ios.listen(callback)
 
     async def io(self) -> Io:
-        """Return inputs, outputs, registers and tool: the latest values, or else the next ones, within about 1 s.
+        """Return inputs, outputs, registers and tool: the latest values, or if none have come yet the next ones (1 s).
 
         Raises:
             AnswerTimeoutError: No message arrived within `STATE_S`.
@@ -205,7 +205,7 @@ class Connection(Questions):
         return await self._states.next(lambda state: state.tick >= tick, STATE_S)
 
     async def rest(self) -> State:
-        """Step time until the shaped reference is at rest, or wait if others step; return the first such state.
+        """Step time, or wait if this client cannot, until the shaped reference is at rest; return the first state then.
 
         The arm may still vibrate.
         """
@@ -224,14 +224,14 @@ class Connection(Questions):
                 await motion.wait_event()
 
     async def _see_pass(self, ticks: int) -> int:
-        """Wait until ticks have passed, counted from the next state; return the last one."""
+        """Wait until this many ticks have passed after the next state; return the last tick."""
         last = (await self._next_state()).tick + ticks
         while (tick := (await self._next_state()).tick) < last:
             pass
         return tick
 
     async def _let_pass(self, ticks: int) -> int | None:
-        """Step time; return None if this client cannot: in real time, or if another client holds the clock."""
+        """Step time. Return None if this client cannot: in real time, or if another client holds the clock."""
         if await self.clock() == "realtime":
             return None
         try:

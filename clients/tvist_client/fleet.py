@@ -26,11 +26,11 @@ from tvist_protocol.codec import decode, decode_reply, encode
 T = TypeVar("T")
 ANSWER_S = 3.0  # longest wait for a robot's answer [s]
 SETTLE_S = 0.3
-"""Time for tokens to arrive after the session has opened [s]; on a slow network, `look` also sees late ones."""
+"""Time after opening a session in which tokens of robots arrive [s]; `look` also finds those that come later."""
 LISTEN_S = 1.3  # time in which every robot in real time publishes its telemetry at least once [s]
 _TIMING = ("ticks_per_second", "missed_ticks", "late_p99_us", "load", "due_ticks", "overloaded")
-"""Fields of a fleet's robot that its telemetry has."""
-_OF_INFO = ("model", "clock", "control")  # those that its description has
+"""Fields of `FleetRobot` that come from telemetry."""
+_OF_INFO = ("model", "clock", "control")  # fields of a fleet's robot that its `info` has
 
 
 class RobotPlace(NamedTuple):
@@ -81,7 +81,7 @@ class FleetSession(ABC):
         """Subscribe, once the session is open."""
 
     def _of_robots(self, handle: Callable[[RobotPlace, zenoh.Sample], None]) -> "Callback[zenoh.Sample]":
-        """Return a callback that passes what is on robots' keys to a function on the loop."""
+        """Return a callback that calls `handle` on the loop for each sample with a robot's key."""
 
         def on_sample(sample: zenoh.Sample) -> None:
             place = keys.place(str(sample.key_expr))
@@ -92,7 +92,7 @@ class FleetSession(ABC):
 
 
 class FleetRobot(msgspec.Struct, frozen=True, kw_only=True):
-    """A robot of a fleet, as one query of `info` has found it."""
+    """A robot of a fleet, as described by its `info` and telemetry at one time."""
 
     namespace: str
     name: str
@@ -175,13 +175,13 @@ class Fleet(FleetSession):
         (self.places.add if there else self.places.discard)(place)
 
     def _on_telemetry(self, place: RobotPlace, sample: zenoh.Sample) -> None:
-        with suppress(ProtocolError):  # from another version; its silence is reported
+        with suppress(ProtocolError):  # answer of another version: reported as silence
             self._told[place] = (self._loop.time(), decode(Telemetry, sample.payload.to_bytes()))
 
     async def _ask(
         self, place: RobotPlace, leaf: keys.Leaf, data: bytes | None, read: Callable[[bytes], T]
     ) -> T | str:
-        """Return a robot's answer, or why there is none: an error would delay the other robots."""
+        """Return a robot's answer, or why there is none: raising an error would end the queries of other robots."""
         reply = await ask(self._session, place.key(leaf), data, ANSWER_S)
         if reply is None and place in self.places and self._security is not None:
             return "it takes no commands from this client: use an operator's certificate (`tvist keys --operator`)"
@@ -236,7 +236,7 @@ class ManyStates(FleetSession):
     """Newest state of each robot that a key selects, decoded by `look`. Use it as an asynchronous context.
 
     `selector` is a key with wildcards that ends in `/state`, such as `tvist/*/state`, or `**/tvist/*/state` for all
-    namespaces; MisuseError if it is not. `namespace` precedes it.
+    namespaces; MisuseError for other keys. The selector applies within `namespace`.
     """
 
     def __init__(

@@ -49,7 +49,7 @@ async def halt(robot: Robot, endpoint: str) -> HaltReport:
 
 
 async def _rest(robot: Robot, tick: int) -> State:
-    """Return the first state after a tick in which no stop is under way."""
+    """Return the first state after tick `tick` in which no stop is in progress."""
     state = await robot.until(tick + 1)
     while state.runtime_state == RuntimeState.STOPPING:
         state = await robot.until(state.tick + 1)

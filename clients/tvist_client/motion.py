@@ -68,14 +68,14 @@ class Motion:
             self._ended.set()
 
     def fail(self, error: ClientError) -> None:
-        """Note that no further events of the motion will arrive."""
+        """Note that no further events of the motion will arrive, because of this error."""
         if not self.ended:
             self._error = error
             self._ended.set()
 
 
 class MotionsByNumber:
-    """The motions of one robot by number, each created by its answer or first event, whichever comes first."""
+    """The motions of one robot by number. The answer or the first event, whichever comes first, creates a motion."""
 
     def __init__(self, pass_time: Callable[[Motion], Awaitable[None]]) -> None:
         self._pass_time, self._motions = pass_time, dict[int, Motion]()

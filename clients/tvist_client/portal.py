@@ -1,4 +1,4 @@
-"""An event loop in a thread, and access to it from threads that may block."""
+"""An event loop in a thread, which other threads use by blocking calls."""
 
 import asyncio
 import contextlib
@@ -26,10 +26,10 @@ class Portal:
         self.closed = False
 
     def call(self, function: Callable[[], Any]) -> Any:
-        """Run a function on the loop and wait for its result, or its coroutine's, in this thread; Ctrl-C cancels it.
+        """Run a function on the loop; wait for its result, or that of its coroutine. Ctrl-C cancels the coroutine.
 
-        An error of the client or protocol is raised without its traceback through the loop, which would distract.
-        Raise NotConnectedError if the portal is closed, MisuseError in a callback, which would wait for itself.
+        An error of the client or protocol is raised without the distracting part of its traceback within the loop.
+        Raise NotConnectedError if the portal is closed; MisuseError in a callback, because the call would never return.
         """
         if self.closed:
             raise NotConnectedError("the connection is closed: open another one")
@@ -52,13 +52,13 @@ class Portal:
 
     @contextlib.contextmanager
     def enter(self, context: AbstractAsyncContextManager[T]) -> Iterator[T]:
-        """Enter an asynchronous context manager, and leave it with the block's error if there is one."""
+        """Enter an asynchronous context manager; leave it with the error of the block, if any."""
         value = self.call(context.__aenter__)
         try:
             yield value
         except BaseException as error:
             if sys.is_finalizing():
-                # The interpreter discards a block that was never left; the loop's thread has already ended.
+                # At exit the interpreter discards a generator that was never left, after the loop's thread has ended.
                 raise
             if not self.call(partial(context.__aexit__, type(error), error, error.__traceback__)):
                 raise

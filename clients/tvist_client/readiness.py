@@ -1,4 +1,4 @@
-"""Whether a robot is ready to be moved; if not, the reason and the remedy."""
+"""Judges whether a robot is ready to be moved; if not, gives the reason and the remedy."""
 
 from enum import IntEnum
 
@@ -49,7 +49,7 @@ class Readiness(Struct, frozen=True):
 
 
 async def look(robot: Robot, unlock: str = "tvist unlock") -> Readiness:
-    """Ask a robot whether it is ready to move; `unlock` is the command that unlocks it."""
+    """Ask a robot whether it is ready to move; `unlock` is the command line that unlocks the robot."""
     info, state = await robot.info(), None
     if info.robot_mode is None and (info.clock == "realtime" or info.tick > 0):
         state = await robot.state()
@@ -57,7 +57,7 @@ async def look(robot: Robot, unlock: str = "tvist unlock") -> Readiness:
 
 
 def readiness(info: Info, state: State | None, unlock: str = "tvist unlock") -> Readiness:
-    """Judge readiness from the robot's messages; `state` is for a server whose `info` lacks the modes."""
+    """Judge readiness from the robot's messages; `state` is only needed if an old server's `info` lacks the modes."""
     robot = info.robot_mode if info.robot_mode is not None or state is None else state.robot_mode
     safety = info.safety_mode if info.safety_mode is not None or state is None else state.safety_mode
     if robot is None or safety is None:

@@ -34,9 +34,9 @@ class UnlockReport(msgspec.Struct, frozen=True):
 
 
 async def unlock(robot: Robot, endpoint: str, command: str, *, power_on: bool = False) -> UnlockReport:
-    """Take control, release what a client can release, and check that the robot does not stop again.
+    """Take control, end the stops that a client can end, and check that the robot does not stop again.
 
-    In lockstep, time advances by some hundred ticks. `endpoint`, and the `command` that does this, are for the report.
+    In lockstep, this steps some hundred ticks. `endpoint` and the command line `command` are for the report.
     """
     info, found, done = await robot.info(), await look(robot, command), list[str]()
     if info.watched is not None:
@@ -86,7 +86,7 @@ async def make_ready(robot: Robot, arm: Arm, *, power_on: bool = False) -> list[
 
 
 async def _rest(robot: Robot) -> None:
-    """Wait until a stop has come to rest; before the first tick nothing moves."""
+    """Wait until the arm is at rest after a stop. Before the first tick, nothing moves."""
     ticks = await robot.clock() == "realtime" or (await robot.info()).tick > 0
     if ticks and (await robot.state()).runtime_state == RuntimeState.STOPPING:
         await robot.rest()

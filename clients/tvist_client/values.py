@@ -40,7 +40,7 @@ def whole(value: int, where: str, low: int, high: int | None = None) -> int:
 
 
 def joint_angles(q: Iterable[float], info: Info, where: str = "q") -> tuple[float, ...]:
-    """Convert joint angles to floats, and check them here, since a robot does not answer set-points."""
+    """Convert joint angles to floats, and check them, because a robot does not answer invalid set-points."""
     entries = None
     if not isinstance(q, str | bytes):
         with contextlib.suppress(TypeError):

@@ -1,4 +1,4 @@
-"""Derives classes without `await` from those with it: calls, and their results, wait in the caller's thread."""
+"""Derives blocking classes from asynchronous ones: the caller's thread waits for each result."""
 
 import inspect
 from collections.abc import AsyncIterator, Iterator
@@ -21,7 +21,7 @@ M = TypeVar("M")
 
 
 class Waited(Described):
-    """A method without `await`, with the arguments and the description of the one that it wraps."""
+    """A blocking method, with the arguments and the description of the asynchronous method that it wraps."""
 
     def __init__(self, of: Any) -> None:
         self._of = of
@@ -44,7 +44,7 @@ class Waited(Described):
 
 
 class Attribute:
-    """An attribute or a property of a class with `await`."""
+    """An attribute or a property of an asynchronous class, for its blocking counterpart."""
 
     def __init__(self, of: type, name: str) -> None:
         self._name = name
@@ -60,7 +60,7 @@ class Attribute:
 
     @property
     def kind(self) -> Any:
-        """Its type."""
+        """Type of the attribute."""
         if self._getter is not None:
             return get_type_hints(self._getter)["return"]
         return get_type_hints(self._part)[self._name]
@@ -72,18 +72,18 @@ class Attribute:
     __doc__ = property(_description)
 
 
-_TWINS: dict[Any, Any] = {}  # the classes without `await`, by those with it
+_TWINS: dict[Any, Any] = {}  # blocking classes, by their asynchronous ones
 
 
 class Waiting:
-    """Base of the classes without `await`."""
+    """Base of the blocking classes."""
 
     def __init__(self, portal: Portal, inner: Any) -> None:
         self._portal, self._inner = portal, inner
 
 
 def without_await(of: type, *internal: str, base: type[Waiting] = Waiting) -> Any:
-    """Return a counterpart without `await` of a class, with its public members except `internal` ones."""
+    """Return the blocking counterpart of a class: its public members except those named in `internal`."""
     members: dict[str, Any] = {
         "__module__": "tvist_client.blocking",
         "__doc__": inspect.cleandoc(of.__doc__ or "").partition("\n\nArgs:")[0],
@@ -170,12 +170,12 @@ def _result(kind: Any) -> Any:
 
 
 def _twin(portal: Portal, result: Any) -> Any:
-    """Return a result's counterpart without `await`."""
+    """Return a result's blocking counterpart."""
     if (twin := _TWINS.get(type(result))) is not None:
         return twin(portal, result)
     if isinstance(result, AbstractAsyncContextManager):
         return _entered(portal, result)
-    if isinstance(result, FunctionType):  # it ends a subscription
+    if isinstance(result, FunctionType):  # a function that ends a subscription
         return lambda: portal.call(result)
     return result
 

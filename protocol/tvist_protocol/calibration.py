@@ -29,7 +29,7 @@ class PolynomialModel(_Part, frozen=True, kw_only=True):
     degree: Annotated[int, Meta(ge=0, le=12)]  # highest total degree
     centre: Annotated[tuple[Angle, ...], Meta(min_length=1, max_length=7)] | None = None
     """Angles that are subtracted from the joint angles [rad]; null: zeros."""
-    scale: None = None  # null: the angles are not scaled. Recordings have it
+    scale: None = None  # always null, no scaling; kept because recordings have it
     f_d_coefficients: Coefficients  # coefficients of f_d, one per term [Hz]
     zeta_coefficients: Coefficients  # coefficients of ζ, one per term [-]
     f_d_range: tuple[Frequency, Frequency]  # range to which values of f_d are clipped [Hz]

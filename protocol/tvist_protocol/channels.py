@@ -1,4 +1,4 @@
-"""The keys of a robot and their messages as a table, for the generated documents and for tests."""
+"""Table of a robot's keys and their messages, for generated documents and tests."""
 
 from dataclasses import dataclass
 from typing import Literal, get_args
@@ -18,7 +18,7 @@ class Channel:
 
     key: str  # with `{robot}` and `{client}` as placeholders of names
     kind: Literal["put", "queryable", "liveliness"]
-    by: Literal["server", "client"]  # side that puts, asks or declares
+    by: Literal["server", "client"]  # side that puts messages, sends queries or declares tokens
     messages: tuple[type[Struct], ...]  # types that are put or asked
     answers: tuple[type[Struct], ...]
     meaning: str  # description for the documents

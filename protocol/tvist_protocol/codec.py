@@ -25,7 +25,7 @@ from tvist_protocol.values import Name
 Message = Command | Setpoint | Reply | State | Event | Truth | Telemetry | Io | Info
 
 MAX_BYTES = 256 * 1024
-"""Largest message that is decoded [bytes]; the longest are steps of 1000 set-points (85 kB) and calibrations."""
+"""Largest message that is decoded [bytes]; steps of 1000 set-points (85 kB) and calibrations are the longest."""
 
 _Some = TypeVar("_Some")
 _SomeMessage = TypeVar("_SomeMessage", bound=Message)
@@ -39,13 +39,13 @@ class Envelope(msgspec.Struct, frozen=True, gc=False):
 
 
 class _Calibrated(msgspec.Struct, gc=False):
-    """The field of a `set_estimator` that may be long."""
+    """The only field of `set_estimator` that may be long."""
 
     calibration: Name | Calibration | None = None
 
 
 class _Untyped(msgspec.Struct, tag_field="type", tag=""):
-    """A further member of every union, without which msgspec would not require `type` in a union of one struct."""
+    """Added to every union: in a union of only one struct, msgspec would not require the field `type`."""
 
 
 def _decoded(decoder: msgspec.msgpack.Decoder[_Some], data: bytes, types: Types) -> _Some:
@@ -118,7 +118,7 @@ def refusal(error: ProtocolError) -> Refused:
 
 
 def decode_envelope(data: bytes) -> Envelope:
-    """Return type and token of a message without validating other fields; ProtocolError if these are invalid."""
+    """Return type and token of a message without validating other fields; ProtocolError if they are invalid."""
     return _decoded(_ENVELOPE, data, {})
 
 
@@ -126,11 +126,11 @@ def decode_command(data: bytes) -> Command:
     """Decode a command.
 
     Raises:
-        ProtocolError: The bytes are not a valid command. `decode_reply` and `decode` raise it likewise.
+        ProtocolError: The bytes are not a valid command. `decode_reply` and `decode` raise this error, too.
     """
     if EXPLAINED_BYTES < len(data) <= MAX_BYTES and b"set_estimator" in data:
         decode_envelope(data)  # refuses bytes that are no MessagePack map
-        # Refuse an invalid calibration from its bytes: building a map of it may take a hundred times as long.
+        # Validate a calibration in the bytes: first building a map of them may take a hundred times as long.
         _decoded(_CALIBRATED, data, {})
     return _COMMAND.read(data)
 
@@ -141,6 +141,6 @@ def decode_reply(data: bytes) -> Reply:
 
 
 def decode(kind: type[_SomeMessage], data: bytes) -> _SomeMessage:
-    """Decode a message of a key that has one kind of message: `decode(State, data)`."""
+    """Decode a message of a key on which all messages have the same type: `decode(State, data)`."""
     message: _SomeMessage = _READER_OF[kind].read(data)
     return message

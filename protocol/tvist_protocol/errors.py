@@ -57,7 +57,7 @@ class RefusedError(TvistError):
 
 
 def harmless(text: str) -> str:
-    """Make a text that may contain parts of a file or of a sender safe for a terminal; lines and tabs remain."""
+    """Make a text of unknown origin safe for a terminal; line feeds and tabs remain."""
     return HARMFUL.sub("\N{REPLACEMENT CHARACTER}", text)
 
 
@@ -68,7 +68,7 @@ def short(text: str, most: int = SHOWN) -> str:
 
 
 def one_line(text: str) -> str:
-    """Make a message that repeats text of a file safe to show: one printable line, shortened."""
+    """Make a message that quotes a file safe to show: one printable line, shortened."""
     return short(re.sub(r"\s", " ", text), LONGEST)
 
 

@@ -1,4 +1,4 @@
-"""Converts msgspec's errors to code, field, message and limit; a short faulty message is decoded again for this."""
+"""Converts msgspec's errors to code, field, message and limit. To name values, short messages are decoded again."""
 
 import math
 import re
@@ -17,13 +17,13 @@ FAULTS = (ValueError, TypeError, OverflowError, RecursionError, MemoryError)
 
 EXPLAINED_BYTES = 4096  # longest message whose values are named [bytes]
 
-_DEPTH = 32  # levels that are searched: a value that is nested deeper contains itself
+_DEPTH = 32  # levels that are searched; a value with more levels contains itself
 
 Types = Mapping[str, type[msgspec.Struct]]  # the possible messages, by `type`
 
 
 class _Head(msgspec.Struct):
-    """The field of a long message that is decoded again, to name its type."""
+    """The only field of a long message that is decoded again, so that errors can name the message's type."""
 
     type: str | None = None
 
@@ -44,7 +44,7 @@ class _Fault:
 
 
 def explain_refusal(error: msgspec.ValidationError, data: bytes, types: Types) -> ProtocolError:
-    """Return the error of a message of another type, naming its values up to `EXPLAINED_BYTES`, then only its type."""
+    """Return the error of an invalid message; if it is longer than `EXPLAINED_BYTES`, the error names no values."""
     message = _untyped(data, Any if len(data) <= EXPLAINED_BYTES else _Head)
     name = message.get("type") if isinstance(message, dict) else None
     return _explain(error, message, types.get(name) if isinstance(name, str) else None, "the message", types)
@@ -132,7 +132,7 @@ def _tag(fault: _Fault) -> ProtocolError:
 
 
 def _kind(fault: _Fault, wanted: str, got: str) -> ProtocolError:
-    # A boolean or bytes would be shown as another value than the sender wrote.
+    # A boolean or bytes would be shown differently from what the sender wrote.
     if isinstance(fault.value, str | int | float) and got not in {"bool", "bytes"}:
         why = f"{fault.whole} is {quoted(fault.value)}: must be {_kinds(wanted)}"
     else:
@@ -197,7 +197,7 @@ def explain_unencodable(message: msgspec.Struct, error: Exception) -> ProtocolEr
 
 
 def _unencodable(value: object, where: str, depth: int) -> tuple[str, object]:
-    """Return place and value of the first part that MessagePack does not have."""
+    """Return place and value of the first part that has a type unknown to MessagePack."""
     for at, entry in _entries(value, where) if depth else ():
         try:
             msgspec.msgpack.encode(entry)

@@ -29,12 +29,12 @@ def generated(folder: Path) -> dict[Path, bytes]:
 
 
 def stray(folder: Path, files: Iterable[Path]) -> set[Path]:
-    """Return files in the places of generated ones that are not among them, such as those of a removed message."""
+    """Return files in folders of generated files that are not generated any more, such as a removed message's."""
     return {*(folder / "schemas").iterdir(), *(folder / "fixtures" / "v1").glob("*.msgpack")} - set(files)
 
 
 def golden(folder: Path) -> list[Path]:
-    """Return the golden messages, which are written by hand."""
+    """Return the files with golden messages (JSON written by hand)."""
     return sorted((folder / "fixtures" / "v1").glob("*.json"))
 
 

@@ -14,10 +14,10 @@ from tvist_protocol.values import (
 
 PREFIX = "tvist"
 Leaf = Literal["state", "truth", "event", "telemetry", "io", "command", "setpoint", "info", "alive", "client"]
-"""What follows a robot's name in its keys; a client's name follows `client`."""
+"""Last part of a robot's keys; after `client`, the client's name follows."""
 
 ANY_ALIVE = f"{PREFIX}/*/alive"
-"""Selects the liveliness tokens of all robots, which is how a client finds them."""
+"""Selects the liveliness tokens of all robots, by which clients find robots."""
 
 ANYWHERE_ALIVE = f"**/{ANY_ALIVE}"
 """Selects the liveliness tokens of all robots of all namespaces, for a session without a namespace."""
@@ -45,7 +45,7 @@ def within(namespace: str, key: str) -> str:
 
 
 def place(key: str) -> tuple[str, str] | None:
-    """Return namespace (empty if there is none) and name of the robot that a key belongs to; None for other keys."""
+    """Return namespace (or "") and name of the robot that a key belongs to; None if the key is no robot's."""
     above, prefix, rest = f"/{key}".rpartition(f"/{PREFIX}/")
     robot, slash, leaf = rest.partition("/")
     namespace = above.removeprefix("/")
@@ -75,7 +75,7 @@ def any_client(robot: str) -> str:
 
 
 def client_of(robot: str, own: str) -> tuple[str, str] | None:
-    """Return name and session (or empty) in the key of a client of this robot; None for other keys."""
+    """Return name and session (or "") in the key of a client's token at this robot; None for other keys."""
     prefix = f"{key(robot, 'client')}/"
     name, slash, session = own.removeprefix(prefix).partition("/")
     sound = _CLIENT.match(name) and bool(_SESSION.match(session)) == bool(slash)

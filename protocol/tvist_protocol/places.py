@@ -1,4 +1,4 @@
-"""Resolves the path in an error message of msgspec: the value at its end, and the type expected there."""
+"""Follows the path in an error message of msgspec to the value at its end and the type expected there."""
 
 import re
 import types
@@ -7,7 +7,7 @@ from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin, 
 
 import msgspec
 
-ABSENT: Final = object()  # value of a place that the content does not have
+ABSENT: Final = object()  # value of a place that is missing in the content
 _STEP = re.compile(r"\.([^.\[]+)|\[(\d+)\]|\[(\.\.\.)\]")
 
 
@@ -46,7 +46,7 @@ class Place:
 
     @property
     def struct(self) -> type[msgspec.Struct] | None:
-        """The struct expected there, in a union that of the value's `type`, else the first; None if another type is."""
+        """The struct expected there, in a union the one of the value's `type` or else the first; None: no struct."""
         found = list(_structs(self.kind))
         tag = self.value.get("type") if isinstance(self.value, dict) else None
         return next((kind for kind in found if kind.__struct_config__.tag == tag), next(iter(found), None))
@@ -58,13 +58,13 @@ class Place:
 
     @property
     def literals(self) -> list[str]:
-        """The strings that are valid there, in quotes."""
+        """The strings that are valid at this place, in quotes."""
         literals = (get_args(kind) for kind in _choices(self.kind) if get_origin(kind) is Literal)
         return [repr(one) for each in literals for one in each]
 
 
 def _choices(kind: object) -> Iterator[object]:
-    """Yield the members of a union, without their `Annotated`; for any other type, the type itself."""
+    """Yield the members of a union without `Annotated`; if the type is no union, yield the type itself."""
     origin = get_origin(kind)
     if origin is Annotated:
         yield from _choices(get_args(kind)[0])
@@ -94,7 +94,7 @@ def _entry_type(kind: object, name: str | None, index: str | None) -> object:
 
 
 def _culprit(content: Any, kind: object) -> str:
-    """Return the key of the first entry of a map that does not have the type; `...` if all have it."""
+    """Return the key of a map's first entry that is not of type `kind`; `...` if all entries are."""
     for key, value in content.items() if isinstance(content, dict) else ():
         try:
             msgspec.convert(value, kind)

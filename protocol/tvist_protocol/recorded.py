@@ -4,8 +4,8 @@ A recording is an MCAP file with channels `state`, `event`, `truth`, `io` and `j
 keys. Its times are ticks of 2 ms as nanoseconds since tick 0, never the wall clock. Metadata `tvist` has the format,
 `info`, and `start` (how the server was started); metadata `tvist.end` the messages dropped on each channel.
 
-Viewers require one plain type per field, without null. A null field is therefore omitted, and null in a list or a
-field stands for a number that is not finite, which JSON cannot express.
+Viewers require one plain type per field, without null. A null field is therefore omitted, and null in a list or
+field means that a number is not finite, which JSON cannot express.
 """
 
 import math
@@ -33,7 +33,7 @@ METADATA = "tvist"  # name of the metadata written first: `format`, and `info` a
 END_METADATA = "tvist.end"
 """Name of the metadata written last: for each channel, how many messages were dropped."""
 BEHAVIOUR = "behaviour"
-"""Entry of that metadata: the number of the robot's behaviour, see `THIS_BEHAVIOUR`; 1 where it is missing."""
+"""Entry of the metadata `tvist`: number of the robot's behaviour, see `THIS_BEHAVIOUR`; 1 if missing."""
 THIS_BEHAVIOUR = 7
 """Number of the present behaviour. It rises with every deliberate change of the bits that a robot computes:
 
@@ -43,7 +43,7 @@ THIS_BEHAVIOUR = 7
 7: all kinematics of the rigid arm come from one chain of links; singular arms find nearer postures.
 """
 FROM_TICK = "from_tick"
-"""Entry of that metadata in a segment after the first one of a recording: its first tick."""
+"""Entry of the metadata `tvist` in every segment of a recording but the first: number of its first tick."""
 
 _SEGMENT = re.compile(r"(.+)-(\d+)-part(\d+)(\.[^.]*)?", re.DOTALL)
 
@@ -52,7 +52,7 @@ _ENCODER = msgspec.json.Encoder()
 
 
 def segment_name(name: str, run: int, number: int | None) -> str:
-    """Return a segment's name, `run-2-part0001.mcap` for `run.mcap`; None as `number` gives a pattern of all."""
+    """Return a segment's name, `run-2-part0001.mcap` for `run.mcap`; if `number` is None, a pattern of the run's."""
     path = PurePath(name)
     if number is None:
         return f"{escape(path.stem)}-{run}-part*{escape(path.suffix)}"
@@ -60,7 +60,7 @@ def segment_name(name: str, run: int, number: int | None) -> str:
 
 
 def segment_of(name: str) -> tuple[str, int, int] | None:
-    """Return the recording, run and number of a segment from its file name; None if it is not a segment."""
+    """Return recording, run and number from a segment's file name; None if the file is not a segment."""
     found = _SEGMENT.fullmatch(name)
     if found is None:
         return None
@@ -81,7 +81,7 @@ def topics(robot: str) -> dict[type[msgspec.Struct], str]:
 
 
 def to_json(message: Recorded) -> bytes:
-    """Encode a message so that every finite float can be restored bit for bit; TypeError if JSON lacks a type."""
+    """Encode a message; finite floats are restored bit for bit. TypeError if a value has a type unknown to JSON."""
     content: dict[str, Any] = {"type": tag(type(message))}
     for name in message.__struct_fields__:
         value = getattr(message, name)
@@ -104,7 +104,7 @@ class JsonReader(Generic[_Some]):
         self._before = _ENCODER.encode(self._absent)[:-1] + b"," if self._absent else b""
 
     def read(self, data: bytes) -> _Some:
-        """Decode a message, with NaN for a number that was not finite; raise ProtocolError if it has another type."""
+        """Decode a message; numbers that were not finite become NaN. ProtocolError if the message has another type."""
         try:
             try:
                 # Add null for omitted fields; if a key occurs twice, msgspec keeps the later one, from the data.

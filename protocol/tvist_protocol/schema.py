@@ -49,13 +49,13 @@ def field_docs(described: type) -> dict[str, str]:
 
 @cache
 def _classes(module: str) -> dict[str, ast.ClassDef]:
-    """Return the classes of a module, parsed once: `inspect.getsource` of a class also parses the whole module."""
+    """Return the classes of a module, parsed once, since `inspect.getsource` would parse the module for each class."""
     tree = ast.parse(inspect.getsource(sys.modules[module]))
     return {part.name: part for part in ast.walk(tree) if isinstance(part, ast.ClassDef)}
 
 
 def _structs(base: type[msgspec.Struct] = msgspec.Struct) -> dict[str, type[msgspec.Struct]]:
-    """Return the protocol's structs by name, which none shares with another."""
+    """Return the protocol's structs by their names, which are unique."""
     found: dict[str, type[msgspec.Struct]] = {}
     for kind in base.__subclasses__():
         found |= {kind.__name__: kind} if kind.__module__.startswith("tvist_protocol.") else {}

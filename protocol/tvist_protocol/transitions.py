@@ -1,4 +1,4 @@
-"""Activities of a robot and transitions between them, as one table; a trigger is a command or a happening."""
+"""Activities of a robot and a table of the transitions between them; commands and other events trigger them."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -44,7 +44,7 @@ class Activity(StrEnum):
     """Whether the activity is a protective stop."""
 
     def safety_mode(self, *, reduced: bool) -> SafetyMode:
-        """Return the safety mode as numbered by RTDE, unless the safety system has a more serious one."""
+        """Return the safety mode as numbered by RTDE; a more serious mode of the safety system takes precedence."""
         if self.protective:
             return SafetyMode.PROTECTIVE_STOP
         return SafetyMode.REDUCED if reduced else SafetyMode.NORMAL
@@ -52,7 +52,7 @@ class Activity(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Transition:
-    """Rows of the table with the same trigger and target."""
+    """Rows of the table that have the same trigger and the same target."""
 
     trigger: str  # `type` of a command, or one of `HAPPENINGS`
     sources: tuple[StrEnum, ...]
@@ -91,15 +91,15 @@ HAPPENINGS: dict[str, str] = {
 
 _A = Activity
 _FREE_TO_END = (_A.MOVING, _A.PAUSED, _A.STREAMING, _A.GUIDED, _A.ENDING, _A.STOPPING)
-"""Activities in which a motion can still be stopped."""
+"""Activities with a motion that a stop can end."""
 _DRIVEN_ON = (
     *_FREE_TO_END,
     _A.POWERING_OFF,
     _A.PROTECTIVE_STOPPING,
-)  # activities in which drives move the arm
+)  # activities in which the drives move the arm
 _ROBOT_MODES = {_A.POWER_OFF: RobotMode.POWER_OFF, _A.BRAKING: RobotMode.POWER_OFF, _A.IDLE: RobotMode.IDLE}
 for _activity in Activity:
-    # Attributes, because looking up another member at every tick takes ten times as long.
+    # Attributes, because looking up an enumeration's member at every tick would take ten times as long.
     _activity.robot_mode = _ROBOT_MODES.get(_activity, RobotMode.RUNNING)
     _activity.moving = _activity in {*_DRIVEN_ON, _A.BRAKING}
     _activity.protective = _activity in {_A.PROTECTIVE_STOPPING, _A.PROTECTIVE_STOP}
@@ -165,7 +165,7 @@ def after(activity: Activity, trigger: str) -> Activity | None:
 
 
 def diagram(states: type[StrEnum]) -> str:
-    """Return the table's part for these states as a Mermaid diagram; transitions of all motions are drawn once."""
+    """Return the rows of these states as a Mermaid diagram; one that all moving states share is drawn once."""
     arrows: dict[tuple[str, str], list[str]] = {}
     for row in TRANSITIONS:
         sources = [source for source in row.sources if isinstance(source, states)]

@@ -11,7 +11,7 @@ _NAME = re.compile(r"(?!.*(^|\.)\d+$)[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*")
 
 
 class AllowedHosts:
-    """IP addresses, networks and host names that programs may connect to; raise StartError for an invalid entry."""
+    """IP addresses, networks and host names that programs may connect to. An invalid entry raises StartError."""
 
     def __init__(self, given: Sequence[str]) -> None:
         self._names, self._networks = set(given), list[ipaddress.IPv4Network | ipaddress.IPv6Network]()
@@ -27,7 +27,7 @@ class AllowedHosts:
     def allows(self, name: str, address: str, origin: str | None) -> bool:
         """Return whether a program from `origin` (None: unknown) may connect to `address`, found for `name`.
 
-        The loopback interface is open only to programs from this machine, or if it is listed itself.
+        Programs from other machines may connect to the loopback interface only if it is listed itself.
         """
         to, sender = ip_of(address), None if origin is None else ip_of(origin)
         if to.is_loopback or to.is_unspecified:  # a name or a wide network must not open it as a side effect

@@ -1,4 +1,4 @@
-"""Distributes a server's robots over processes, and builds its parts: robots, their interfaces and their clocks."""
+"""Distributes a server's robots over processes; creates the robots, their interfaces and their clocks."""
 
 import multiprocessing
 from collections.abc import Callable, Sequence
@@ -27,21 +27,21 @@ LOCAL = "unixsock-stream/"  # prefix of the endpoints reserved for the server's 
 
 @dataclass(frozen=True)
 class Share:
-    """The robots that one of several processes serves."""
+    """The robots that one process of a server serves."""
 
-    numbers: range  # indices of the robots in the list of all
+    numbers: range  # indices of these robots in the list of all robots
     router: str | None = None
-    """Endpoint of the process that clients connect to; None if this process has the configured endpoints."""
+    """Endpoint of the process that clients connect to; None if this process itself has the configured endpoints."""
 
 
 def shares(robots: int, workers: int) -> list[range]:
-    """Return the robots of each process: consecutive ones, in parts whose sizes differ by at most one."""
+    """Return each process's range of robot indices; the numbers of robots differ by at most one."""
     bounds = [worker * robots // workers for worker in range(workers + 1)]
     return [range(first, last) for first, last in pairwise(bounds)]
 
 
 def check_together(config: ServeConfig, robots: int) -> None:
-    """Check durations, folders, and the options for network and processes; StartError if one is wrong or excluded."""
+    """Raise StartError for an invalid duration, folder, host or input, or for options that exclude each other."""
     config.keep_ticks()
     config.dump_folder()
     config.program_folder(config.name)
@@ -85,7 +85,7 @@ def make_robot(
 
 
 def security_of(config: ServeConfig, names: Sequence[str]) -> tuple[list[str], dict[str, Any]]:
-    """Return the endpoints to listen on and the settings that protect them; StartError for unprotected exposure."""
+    """Return the endpoints to listen on and the settings that protect them; StartError if that is impossible."""
     check_endpoints("connect", config.connect)
     # The router checks the certificates of clients that reach the robot through it.
     return server_security(
@@ -98,7 +98,7 @@ def security_of(config: ServeConfig, names: Sequence[str]) -> tuple[list[str], d
 
 
 def ur_interfaces(robot: ServedRobot, config: ServeConfig, number: int) -> "UrInterfaces":
-    """Create the UR interfaces of a robot by its index; StartError if others could reach them unprotected."""
+    """Create the UR interfaces of robot `number`; StartError if other machines could reach them unprotected."""
     from tvist_server.gateways.ur.interfaces import UrInterfaces
     from tvist_server.gateways.ur.rtde.variables import matching
 
@@ -120,7 +120,7 @@ def ur_interfaces(robot: ServedRobot, config: ServeConfig, number: int) -> "UrIn
 
 
 def check_paces(config: ServeConfig, robots: Sequence[ServedRobot]) -> None:
-    """Raise StartError if a plant sets the tick and either it is not alone or another clock is configured."""
+    """If a plant starts the ticks itself, raise StartError if the clock is not real time or there are more robots."""
     if not any(robot.driven.pace for robot in robots):
         return
     if config.clock != "realtime" or config.speed != 1.0:
@@ -134,7 +134,7 @@ def check_paces(config: ServeConfig, robots: Sequence[ServedRobot]) -> None:
 
 
 def make_clocks(config: ServeConfig, robots: Sequence[ServedRobot]) -> list[Clock]:
-    """Create one clock for all robots in real time; in lockstep one each, since waiting for clients delays others."""
+    """Create the clocks: in real time one for all robots; else one per robot, so that no robot waits for another."""
     if config.clock == "realtime":
         driven = [robot.driven for robot in robots]
         return [Realtime(driven, PERIOD, config.speed, priority=config.realtime_priority)]

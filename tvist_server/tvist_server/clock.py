@@ -1,4 +1,4 @@
-"""Clocks of served robots, the wall clock or a client's steps; one thread owns a controller and takes jobs."""
+"""Clocks of served robots: the wall clock or a client's steps. Only a clock's thread uses its controllers."""
 
 import contextlib
 import ctypes
@@ -44,11 +44,11 @@ class TickedRobot:
         self.overload: TickCounts | None = None  # counts missed ticks; None if a client advances time
 
     def post(self, do: Do, client: str | None = None) -> None:
-        """Queue a job from `client` for before the next tick, from any thread, without blocking."""
+        """Queue a job of `client`, which is done before the next tick. Any thread may call this; it does not block."""
         self.jobs.post(do, client)
 
     def guarded(self, do: Do) -> None:
-        """Run a function; an exception in it ends this robot only."""
+        """Run a function; if it raises an exception, end only this robot."""
         try:
             do()
         except Exception:
@@ -68,7 +68,7 @@ class TickedRobot:
             self.host.leave_arm()
 
     def attend(self, stepper: str | None) -> bool:
-        """Do other clients' jobs between a step's ticks, also to wait for data; return whether to go on."""
+        """Between two ticks of a step, do other clients' jobs and wait for sockets; return whether the step goes on."""
         self.jobs.do_others(stepper)
         while not self.ending and (left := self._patience()) > 0.0:
             self.jobs.do_next_other(stepper, left)
@@ -88,9 +88,9 @@ class Clock(ABC):
         self._thread.start()
 
     def close(self) -> None:
-        """End the thread: a step ends before its next tick; in real time, all waiting jobs are done first.
+        """End the thread. In lockstep, a step in progress ends before its next tick; else waiting jobs are done first.
 
-        A thread that an arm or a stalled client blocks is abandoned to the end of the process.
+        If an arm or a stalled client blocks the thread, the thread is left running until the process ends.
         """
         self._running = False
         for robot in self._robots:
@@ -116,7 +116,7 @@ class Clock(ABC):
 
 
 class Lockstep(Clock):
-    """Time passes when a client steps it. Every robot has its own thread, since a step can take long.
+    """A clock that a client steps. Every robot has its own thread, since a step can take long.
 
     If nobody steps, `repeat` republishes the last state every second, for new clients.
     """
@@ -137,7 +137,7 @@ class Lockstep(Clock):
 
 
 class Realtime(Clock):
-    """Ticks of all robots in one thread, at every period of the monotonic clock, or of one arm."""
+    """Ticks all robots in one thread, at each period of the monotonic clock, or when the arm of a plant ticks."""
 
     def __init__(
         self,
@@ -208,7 +208,7 @@ class Realtime(Clock):
             return True
 
     def _do_without_tick(self, robot: TickedRobot, silent: bool) -> bool:
-        """Answer the clients of an arm that does not tick, and warn them once; return True."""
+        """While the arm does not tick, answer clients, and warn them unless `silent` (already warned); return True."""
         robot.guarded(robot.jobs.do_waiting)
         if not silent and robot.interval is None:  # a watched robot reports by itself that it is lost
             robot.host.warn(

@@ -40,7 +40,7 @@ from tvist_server.watching.watched_robot import WatchedRobot
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 SPEED_CAP = 0.5  # default speed limit of a real robot that tvist moves [rad/s]
 TOOL_IN_WORLD = 1.0
-"""Default mass on the flange in a scene [kg]: without one, the sensor would not feel what the wrist touches."""
+"""Default mass on the flange in a scene [kg]; with no mass, the sensor would not measure contacts of the wrist."""
 _REAL = ("enable_motion", "speed_cap", "tcp", "servo_lag")
 MOST_LAG, LEAST_GAIN = 0.15, 50.0
 """Largest lag [s] and smallest gain [1/s²] of a `servoj` that can be compensated."""
@@ -53,7 +53,7 @@ T = TypeVar("T")
 
 
 class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The options, and the setups, folders and endpoints that follow from them."""
+    """Options of a server; the methods return the setups, folders and endpoints that follow from them."""
 
     def setups(self) -> list[Setup]:
         """Return the initial setup of every robot's controller; raises as `setup` does."""
@@ -82,7 +82,7 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
         return ProgramFolder.of(_folder("programs", self.programs), name)
 
     def dump_folder(self) -> Path:
-        """Return the folder for the record of the last second before a failure; raise StartError if it is not one."""
+        """Return the folder for records of the last second before a failure; StartError if the path is no folder."""
         if self.dump is not None:
             return _folder("dump", self.dump)
         try:
@@ -99,7 +99,7 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
         return ticks_of(self.keep, "keep")
 
     def interfaces(self, number: int) -> tuple[str, dict[InterfaceName, int]]:
-        """Return address and ports of a robot's UR interfaces, by its index; StartError if there is no such address."""
+        """Return address and ports of the UR interfaces of robot `number`; StartError if there is no such address."""
         try:
             first = ipaddress.ip_address(self.ur_address)
             address = first + number
@@ -187,7 +187,7 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
         return setup
 
     def _check_real(self, *, real: bool) -> None:
-        """Raise ValueError if an option needs a real UR robot and there is none, or is impossible with one."""
+        """Raise ValueError if an option needs a real UR robot but `real` is False, or the reverse."""
         if not real:
             given = [name for name in _REAL if getattr(self, name)]
             if given:
@@ -211,7 +211,7 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
     def _plant(
         self, cell: Cell | None, description: RobotDescription, calibration: Calibration | None
     ) -> OwnPlant | None:
-        """Return the plant, or the scene around the arm; None: the simulated arm. ValueError for a contradiction."""
+        """Return the chosen plant or the scene's; None: the simulated arm. ValueError if options exclude each other."""
         world = self._scene(cell)
         if world is not None:
             if self.plant is not None or self.hidden is not None:
@@ -236,11 +236,11 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
         return OwnPlant(str(where), "", moved)
 
     def _scene(self, cell: Cell | None) -> str | None:
-        """Return the scene around the arm: the option's, or else the cell's; None: no scene."""
+        """Return the scene around the arm: that of the option `world`, or else of the cell; None: no scene."""
         return self.world or (None if cell is None else cell.world)
 
     def _lag(self, calibration: Calibration | None) -> ServoLag | None:
-        """Return the lag of a real robot from the option or else the calibration; ValueError if it is out of range."""
+        """Return the lag of `servoj` from the option, or else the calibration; ValueError if it is out of range."""
         if self.servo_lag == "simulated":
             return ServoLag.simulated()
         if self.servo_lag is not None:
@@ -266,13 +266,13 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
         return self.profile or ("ursim" if self.ur and not self.enable_motion else None)
 
     def _described(self, description: RobotDescription, profile: Profile) -> RobotDescription:
-        """Return the robot with the chosen sensors and floor."""
+        """Return the robot's description with the options for sensors and floor applied."""
         if _either(self.quiet, profile.quiet):
             description = description.quiet()
         return description if _either(self.floor, profile.floor) else description.without_floor()
 
     def _declared(self, description: RobotDescription, profile: Profile, cell: Cell | None) -> Payload:
-        """Return the declared payload: the option's mass, or else the cell's tool or the profile's mass."""
+        """Return the declared payload: that of the option `payload`, or else of the cell's tool or the profile."""
         if self.payload is None and cell is not None and cell.tools:
             return as_declared(cell.tools[0])
         mass = _either(self.payload, profile.payload)

@@ -14,14 +14,14 @@ from tvist_server.gateways.base import Answer, CommandIntake
 
 
 class RobotIntake(CommandIntake):
-    """Admits valid messages to one robot and rejects others at once, without the controller."""
+    """Checks messages to one robot: passes valid ones on, and rejects others at once without the controller."""
 
     def __init__(
         self,
         host: Host,  # only its thread-safe methods are called here
-        post: Callable[..., None],  # queues a job, with its client if known, for the next tick
-        carry_out: Callable[[Admitted, Answer], None],  # queues a command and answers it
-        complete_info: Callable[[bytes], bytes] = bytes,  # adds to an encoded `info`
+        post: Callable[..., None],  # queues a job (and its client, if known) for the next tick
+        carry_out: Callable[[Admitted, Answer], None],  # queues a command, which is answered when it is done
+        complete_info: Callable[[bytes], bytes] = bytes,  # adds the server's part to an encoded `info`
     ) -> None:
         self._host, self._post, self._carry_out = host, post, carry_out
         self._complete_info = complete_info
@@ -68,7 +68,7 @@ class RobotIntake(CommandIntake):
     def client_gone(self, client: str, session: str = "") -> None:
         with self._lock:
             self._presence.gone(client, session)
-        if self._host.standing.sessions_of(client):  # _unless_gone handles control that is being granted now
+        if self._host.standing.sessions_of(client):  # `_unless_gone` handles a grant in progress
             self._post(lambda: self._host.client_gone(client, session))
 
     def session_gone(self, session: str) -> None:
@@ -96,7 +96,7 @@ class RobotIntake(CommandIntake):
             self._carry_out(admitted, answer)
 
     def _unless_gone(self, client: str, answer: Answer) -> Answer:
-        """Answer a command that grants a client control or the clock, and revoke it if the client has disconnected."""
+        """Return `answer` for a grant of control or the clock; if the client has disconnected, it revokes the grant."""
 
         def answered(reply: Reply) -> None:
             for session in self._host.standing.sessions_of(client):

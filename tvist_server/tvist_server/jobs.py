@@ -15,7 +15,7 @@ class _Job(NamedTuple):
 
 
 class Jobs:
-    """Jobs in order of arrival. During a client's step, jobs of others are done between its ticks, its own after it."""
+    """Jobs in order of arrival. During a client's step, jobs of others run between ticks, its own after the step."""
 
     def __init__(self) -> None:
         self._new: SimpleQueue[_Job] = SimpleQueue()
@@ -43,12 +43,12 @@ class Jobs:
         return True
 
     def do_others(self, stepper: str | None) -> None:
-        """Within a client's step, do the jobs of other clients and set aside those of the stepping client."""
+        """Between two ticks of a step, do the waiting jobs of other clients; set aside those of the stepping client."""
         for _ in range(self._new.qsize()):
             self._do_other(self._new.get(), stepper)
 
     def do_next_other(self, stepper: str | None, timeout: float) -> None:
-        """Within a client's step, wait up to `timeout` [s] for a job, and do it or set it aside."""
+        """Like `do_others` for one job; wait for it up to `timeout` [s]."""
         with suppress(Empty):
             self._do_other(self._new.get(timeout=timeout), stepper)
 

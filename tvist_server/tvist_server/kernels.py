@@ -41,7 +41,7 @@ from tvist_server.punctual import processors
 MOVE_TICKS = 1000  # longest time of a motion that uses kernels [ticks]
 CHECK_EVERY = 0.5  # time between two checks of what is on disk [s]
 FILTERS = (("elastic", 1), ("auto", 1), ("zv", 1), ("none", 2))
-"""Shapers, each with a number of modes, that together use all kernels of shapers."""
+"""Shapers with numbers of modes; together they use all kernels of shapers."""
 STUDIES = {"all_to_drives", "drive", "mean_delay", "play", "product_taps", "shape_all"}
 """Kernels that no served robot calls."""
 KERNELS = tuple(kernel for kernel in kernels if kernel.name.rpartition(".")[2] not in STUDIES)
@@ -53,13 +53,13 @@ class KernelsError(TvistError):
 
 
 def compiled() -> int:
-    """Return how many of `KERNELS` are on disk; if some are missing, the start of a robot takes long."""
+    """Return how many of `KERNELS` are compiled on disk; a robot that starts must compile the others, which is slow."""
     return len(held(KERNELS))
 
 
 @cache
 def warm_up() -> None:
-    """Load every kernel of a served robot, so that no tick does; what is damaged or not on disk is compiled."""
+    """Load every kernel of a served robot before the first tick; compile those that are damaged or not on disk."""
     whole = load_all(KERNELS)
     if not whole or compiled() < len(KERNELS):
         for part in PARTS.values():
@@ -67,7 +67,7 @@ def warm_up() -> None:
 
 
 def compile_ahead(processes: int | None = None, tell: Tell | None = None) -> None:
-    """Compile every kernel of a served robot that is not on disk, in so many processes (None: one per processor).
+    """Compile all kernels of served robots that are not on disk, in `processes` processes (None: one per processor).
 
     `tell` gets the progress. Raise KernelsError if a kernel could not be compiled or stored.
     """
@@ -107,7 +107,7 @@ def _error_of(process: subprocess.Popen[bytes]) -> str:
 
 
 def _line() -> None:
-    """Compile the control line and the simulated arm: all that a tick needs."""
+    """Compile all that a tick computes: the controller's tick and the simulated arm."""
     setup = from_mapping({"clock": "lockstep", "truth": True, "adapt": "payload"}, "configuration").setup()
     arm, still = FlexibleArm(setup.description, body(setup.payload)), np.zeros(setup.description.joints)
     arm.reset(DriveCommand(still, still, still))
@@ -171,7 +171,7 @@ def _setup(robot: str) -> Setup:
 
 
 PARTS: dict[str, Callable[[], None]] = {"line": _line, "plans": _plans}
-"""Compiles each part in about equal times; the line starts with the arm, and finds its filters on disk."""
+"""Functions that compile one part each and take equally long; `plans` compiles filters before `line` needs them."""
 
 
 def _end_with_parent() -> None:

@@ -10,7 +10,7 @@ KEPT = 4096  # largest number of ticks kept: eight seconds, while they are read 
 
 @dataclass(frozen=True)
 class LatenessMonitor:
-    """Lateness of the ticks since the last call of `look`."""
+    """Statistics of the ticks between two calls of `look`."""
 
     ticks: int
     seconds: float
@@ -41,7 +41,7 @@ class Lateness:
         late = self._late[np.arange(max(self._looked, count - KEPT), count) % KEPT] * 1e6
         seconds, ticks = now - self._looked_at, count - self._looked
         self._looked, self._looked_at = count, now
-        worked, self._worked = self._worked, 0.0  # a tick that ends between the two is not counted
+        worked, self._worked = self._worked, 0.0  # a tick that ends just between is not counted
         load = worked / seconds if seconds > 0.0 else 0.0
         if not len(late):
             return LatenessMonitor(0, seconds, 0.0, 0.0, 0.0, load)

@@ -83,7 +83,7 @@ def numbers_of(name: str, given: str | tuple[float, ...], count: int) -> tuple[f
 
 
 def robots_in(text: str, most: int = MAX_ROBOTS) -> list[tuple[str, str]]:
-    """Return robots and their names of a list such as `ur5e*2,other.toml`, after their files: ur5e-1, ur5e-2, other."""
+    """Return file and name of each robot in a list: `ur5e*2,other.toml` gives the names ur5e-1, ur5e-2, other."""
     robots: list[str] = []
     for entry in text.split(","):
         robot, star, count = entry.strip().partition("*")
@@ -121,7 +121,7 @@ def recording_of(record: str, name: str) -> Path:
 
 
 def count_of(what: str, count: str, most: int) -> int:
-    """Return the count after a `*`; the message begins with `what`."""
+    """Return the count after a `*`; StartError, which begins with `what`, unless it is 1 to `most`."""
     number = int(count) if count.isascii() and count.isdigit() and len(count) < 10 else 0
     if not 1 <= number <= most:
         raise StartError(f"{what}: the count after * must be a whole number from 1 to {most}")

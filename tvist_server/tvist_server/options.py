@@ -1,4 +1,4 @@
-"""Options of `tvist serve`: the fields of its configuration. config.py has what is made of them, and imports more."""
+"""Options of `tvist serve`: the fields of its configuration. config.py evaluates them, with more imports."""
 
 from typing import Annotated, Literal
 

@@ -1,4 +1,4 @@
-"""A temporary folder that is removed even if its process is killed, at the latest by the next one."""
+"""A temporary folder. If its process is killed, the next process that makes such a folder removes it."""
 
 import contextlib
 import os

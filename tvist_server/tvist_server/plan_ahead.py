@@ -19,10 +19,10 @@ from tvist_server.gateways.base import Answer
 
 log = logging.getLogger(__name__)
 
-MAX_WAITING = 16  # number of commands that may wait for planning, their own or that of an earlier command
+MAX_WAITING = 16  # number of commands that may wait for their planning, or for that of an earlier command
 MAX_ASKING = 8
 """Number of waiting commands above which questions are refused, to leave room for the client in control."""
-TRIES = 10  # number of outdated plans after which the controller's thread plans itself
+TRIES = 10  # number of outdated plans after which the controller's thread itself plans the command
 CLOSE_WAIT = 1.0  # longest time to finish the current plan at close [s]
 
 _REHEARSING = threading.Lock()
@@ -59,7 +59,7 @@ class PlanAhead:
         host: Host,
         planner: Planner,  # used only by this thread
         post: Callable[[Callable[[], None]], None],  # queues a job for the controller's thread
-        complete: Callable[[Admitted], Admitted | Refused],  # adds a file or refuses
+        complete: Callable[[Admitted], Admitted | Refused],  # adds a program's text, or refuses
     ) -> None:
         self._host, self._planner, self._post, self._complete = host, planner, post, complete
         self._lock = threading.Lock()
@@ -102,7 +102,7 @@ class PlanAhead:
     def _run(self) -> None:
         try:
             with _REHEARSING:  # the robots of a process share what the first of them compiles
-                self._planner.rehearse_scripts()  # takes hundreds of milliseconds, which must not delay the start
+                self._planner.rehearse_scripts()  # takes hundreds of milliseconds, so not before the start
         except Exception:  # motions need no program
             log.exception("programs cannot be compiled")
         while (waiting := self._queue.get()) is not None:
@@ -140,14 +140,14 @@ class PlanAhead:
         self._post(lambda: waiting.answer(self._host.carry_out(waiting.admitted)))
 
     def _reply(self, question: Command, answer: Answer) -> None:
-        """Answer a question, which anyone may ask: it reaches neither the controller nor its journal."""
+        """Answer a question without the controller or its journal; every client may ask."""
         found = self._planner.plan(question, self._present()).found
         assert isinstance(found, Posture | ToolPose | RefusalError)
         reply = found.reply if isinstance(found, RefusalError) else found
         self._post(lambda: answer(reply))
 
     def _present(self) -> PlanningState:
-        """Return the present state; the controller's thread reads it, just before a tick."""
+        """Return the controller's present state, which its thread reads just before a tick."""
         present = SimpleQueue[PlanningState]()
         self._post(lambda: present.put(self._host.controller.snapshot()))
         return present.get()

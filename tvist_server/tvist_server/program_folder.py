@@ -17,14 +17,14 @@ SCRIPT, URP = ".script", ".urp"
 
 
 class ProgramFolder:
-    """The programs in a folder, which is read whenever a client loads one or lists them; None: no programs."""
+    """Programs in a folder (None: no programs), which is read each time a client loads or lists programs."""
 
     def __init__(self, path: Path | None = None) -> None:
         self.path = path
 
     @classmethod
     def of(cls, path: Path, robot: str) -> "ProgramFolder":
-        """Return one robot's folder: the subfolder of its name if there is one, else `path` itself."""
+        """Return one robot's folder: if `path` has a subfolder named after the robot, this subfolder, else `path`."""
         own = path / robot
         return cls(own if own.is_dir() else path)
 
@@ -38,7 +38,7 @@ class ProgramFolder:
             return []
 
     def read(self, name: str) -> str | None:
-        """Return a program's text, ignoring its path (None: no such file); UserFileError if it is not a program."""
+        """Return a program's text, ignoring folders in `name`; None: no such file. UserFileError if no program."""
         file = PurePosixPath(name).name
         candidates = [file, file.removesuffix(URP) + SCRIPT] if file.endswith(URP) else [file]
         for candidate in candidates:
@@ -54,7 +54,7 @@ class ProgramFolder:
         return None
 
     def complete(self, admitted: Admitted) -> Admitted | Refused:
-        """Add the text to a command that loads a program of the folder, so that the journal contains it."""
+        """If a command loads a program of the folder, add the program's text, so that the journal contains the text."""
         command = admitted.command
         if not isinstance(command, ProgramLoad) or command.text is not None:
             return admitted
@@ -68,7 +68,7 @@ class ProgramFolder:
         return admitted._replace(command=command, content=msgspec.to_builtins(command))
 
     def listed(self, info: bytes) -> bytes:
-        """Add the files to the programs in an encoded `info`."""
+        """Add the names of the files to `programs` of an encoded `info`."""
         if not (names := self.names()):
             return info
         content = decode(Info, info)

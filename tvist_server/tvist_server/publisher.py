@@ -20,7 +20,7 @@ class Publisher(Sink):
         self.gateways: Sequence[Gateway] = ()  # each gets every message
 
     def want_truth(self, wanted: bool) -> None:
-        """Note whether a client subscribes to `truth`; from any thread."""
+        """Note whether a client subscribes to `truth`; any thread may call this."""
         self.wants_truth = wanted
 
     def report(self, report: Report) -> None:

@@ -31,7 +31,7 @@ def waited_us() -> float:
 def take_priority() -> bool:
     """Give the calling thread real-time priority (SCHED_FIFO); return whether that succeeded.
 
-    The recorders get the next lower one: if another program displaced a recorder that holds the interpreter's
+    Recorders get a priority lower by 1: if another program displaced a recorder that holds the interpreter's
     lock, the calling thread would wait for that program. Slow work such as planning keeps normal priority.
     """
     if sys.platform != "linux":
@@ -43,7 +43,7 @@ def take_priority() -> bool:
         os.sched_setscheduler(0, policy, os.sched_param(PRIORITY))
         for thread in threading.enumerate():
             if thread.name == RECORDER and thread.native_id is not None:
-                with contextlib.suppress(ProcessLookupError):  # it has just ended
+                with contextlib.suppress(ProcessLookupError):  # the thread has just ended
                     os.sched_setscheduler(thread.native_id, policy, os.sched_param(PRIORITY - 1))
     except OSError as error:
         log.warning(
@@ -57,7 +57,7 @@ def take_priority() -> bool:
 
 
 def background(name: str) -> ThreadPoolExecutor:
-    """Return a thread for slow work, already started: if the tick thread started it, it would inherit its priority."""
+    """Start and return a thread for slow work. A thread that the tick thread starts would inherit its priority."""
     thread = ThreadPoolExecutor(1, name)
     thread.submit(int)
     return thread

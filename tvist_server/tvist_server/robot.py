@@ -42,7 +42,7 @@ LOCAL = "127.0.0.1"  # address of this machine, from which this process's own co
 
 
 class ServedRobot:
-    """A robot with its own resources; robots share only the process, the tick thread and the network.
+    """A robot of a server. It shares process, tick thread and network with other robots, and nothing else.
 
     Raise ValueError if the setup is invalid, RecorderError if the recording cannot be written.
     """
@@ -52,9 +52,9 @@ class ServedRobot:
         setup: Setup,
         record: Path | None,  # file to record into
         dump: Path,  # folder for the last second before a failure
-        observe: Callable[[Controller], Sink] | None = None,  # makes a further sink
+        observe: Callable[[Controller], Sink] | None = None,  # makes another sink for messages
         programs: ProgramFolder | None = None,  # programs that clients load by name
-        hosts: AllowedHosts | None = None,  # besides the sender of a program
+        hosts: AllowedHosts | None = None,  # hosts that programs may connect to, besides their sender
         keep: int | None = None,  # least number of ticks in the recording; None: all
     ) -> None:
         self._programs = programs or ProgramFolder()
@@ -125,24 +125,24 @@ class ServedRobot:
         return lambda command, now: thread.submit(planner.plan, command, now).result
 
     def _studies(self, setup: Setup) -> PayloadLearning | None:
-        """Return what studies motions one at a time; the robot takes a lesson at a tick that its journal records."""
+        """Return what learns the payload from motions, in a thread, or None. The journal has each lesson's tick."""
         planner, thread = Planner(setup), background("tvist-studies")
         self._threads.append(thread)
         return payload_learning_of(setup, lambda work: thread.submit(work).done, planner.for_lesson)
 
     def open(self, gateways: Sequence[Gateway]) -> None:
-        """Set this robot's own gateways, which get its messages and are closed with it."""
+        """Set this robot's gateways, which get its messages and are closed with the robot."""
         self.gateways = gateways
         self.publisher.gateways = gateways
 
     def request(self, command: Command) -> Reply:
-        """Carry out a command of this process, in the controller's thread or, reproducibly, before the first tick."""
+        """Carry out a command of this process, in the controller's thread or (reproducibly) before the first tick."""
         return self.host.request(encode(command), LOCAL)
 
     def repeat(self) -> None:
-        """Publish the state again for new clients, unless time has passed; in the controller's thread."""
+        """If no tick has passed since the last call, publish the state again for new clients; controller's thread."""
         report = self.controller.report
-        # A robot that is stepped publishes newer states; its clients would mistake an old one for a tick.
+        # While a robot is stepped, clients would take a repeated state for a new tick.
         if report.tick == self._looked_at:
             self.publisher.io(self.controller.io())
             self.publisher.report(report)
@@ -178,7 +178,7 @@ class ServedRobot:
         punctuality = self.driven.lateness.look()
 
         def tell() -> None:
-            # The present io, not the last published one: a program may have been played since.
+            # The present `io`, not the last published one: a program may have been played since then.
             if self.driven.pace is not None:  # new clients of a silent arm still get a state
                 self.repeat()
             io = self.controller.io()

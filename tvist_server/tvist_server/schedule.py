@@ -1,10 +1,10 @@
-"""Deadlines of robots' ticks: each robot has its own, and one thread serves all of them."""
+"""Deadlines of robots' ticks: each robot has its own deadlines, and one thread ticks all robots."""
 
 import math
 from heapq import heapreplace
 
 CATCH_UP = 50
-"""Largest number of periods made up for after a delay; further ones are skipped to limit the burst."""
+"""Largest number of periods made up for after a delay; the others are skipped to limit the burst of ticks."""
 
 
 class ExternalTicks:

@@ -1,4 +1,4 @@
-"""The server: several robots, each with its recording, that share one clock and one network."""
+"""The server: robots, each with its own recording, that share a network and, in real time, a clock."""
 
 import asyncio
 import contextlib
@@ -49,7 +49,7 @@ class RecordingResult(NamedTuple):
 
     place: str  # description of its location
     dropped: int  # number of messages dropped because the queue was full
-    error: str | None  # reason why it ended early; None: it did not
+    error: str | None  # reason why the recording ended early; None: it did not
 
 
 class Server:
@@ -74,7 +74,7 @@ class Server:
             setups = [replace(setup, instance=secrets.token_hex(INSTANCE_BYTES)) for setup in setups]
         self._observed = observe is not None
         self.granted: list[str] = []  # what the system granted to make ticks punctual; complete after `start`
-        # A process that others reach through the first one needs no protection.
+        # A worker needs no protection: clients reach it through another process, which is protected.
         listen, guard = (
             security_of(config, [setup.name for setup in setups]) if share.router is None else ([], {})
         )
@@ -124,7 +124,7 @@ class Server:
             robot.warn(f"the connection to the router at {where} {why}")
 
     def discard(self) -> None:
-        """Close the robots of a server that has not started, and remove their recordings."""
+        """If the server has not started, close its robots and remove their recordings."""
         if self.metrics is not None:
             self.metrics.close()
         for robot in self.robots:

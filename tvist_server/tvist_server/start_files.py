@@ -21,7 +21,7 @@ from tvist_shaping import FirShaper
 
 
 def read_cell(path: str) -> Cell:
-    """Read a cell; its scene is one of the package's, or a file beside the cell."""
+    """Read a cell. Its scene is the name of one of the package's scenes, or a file in the cell's folder."""
     cell = read_start_file(path, "cell", Cell)
     if cell.world is not None and cell.world not in scenes():
         cell = msgspec.structs.replace(cell, world=str(Path(path).parent / cell.world))
@@ -56,14 +56,14 @@ def with_shaper(setup: Setup, shaper: str) -> Setup:
         return replace(setup, shaper=shaper)
     own = load_own(shaper)
     modes = own.shaper.modes if isinstance(own.shaper, FirShaper) else 1
-    if modes <= (source := setup.source()).most:  # otherwise making the filter refuses it
+    if modes <= (source := setup.source()).most:  # otherwise creating the filter reports the error
         check_for(own, source.estimator(modes, setup.payload), setup.description.joints)
     known = setup.own_shapers if own in setup.own_shapers else (*setup.own_shapers, own)
     return replace(setup, shaper=own.name, own_shapers=known)
 
 
 def calibration_for(name: str | None, description: RobotDescription) -> Calibration | None:
-    """Load a calibration: one of the package's, a file, or `none`; None: the package's for this model."""
+    """Load a calibration by the name of one of the package's, a path, or `none`; None: the package's for this model."""
     model = description.robot.model
     name = calibrations.default_for(model) if name is None else name
     if name is None:

@@ -1,4 +1,4 @@
-"""Detects overload of a robot, as the protocol's `telemetry` defines it, from counted ticks without a clock."""
+"""Detects overload of a robot, as the protocol's `telemetry` defines it, by counting ticks, without a clock."""
 
 BEGINS, BEGINS_AFTER = 0.20, 2
 """Share of a second's due ticks that must be missed [-], and number of such seconds in a row, to enter overload."""
@@ -7,7 +7,7 @@ ENDS, ENDS_AFTER = 0.05, 5
 
 
 class TickCounts:
-    """Counts a robot's due and missed ticks, `period` apart [s], in seconds measured in due ticks.
+    """Counts a robot's due and missed ticks, `period` apart [s]; a second is as many due ticks as one second has.
 
     A pause of the whole machine is one long second with almost all ticks missed, which alone is no overload.
     """
@@ -16,8 +16,8 @@ class TickCounts:
         self.due_per_second = 1.0 / period
         self.due = self.missed = 0
         self.overloaded = False
-        self._due = self._missed = 0  # when the present second started
-        self._since = 0, 0  # when the present overload started
+        self._due = self._missed = 0  # `due` and `missed` at the start of the present second
+        self._since = 0, 0  # `due` and `missed` at the start of the present overload
         self._seconds = 0
 
     def note(self, missed: int) -> str | None:

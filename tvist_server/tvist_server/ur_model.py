@@ -1,4 +1,4 @@
-"""UR's names of its robots."""
+"""Names of UR's robots."""
 
 import re
 

@@ -11,10 +11,10 @@ InterfaceName = Literal[
     "dashboard", "primary", "secondary", "realtime", "rtde", "interpreter",
     "primary_read_only", "secondary_read_only", "realtime_read_only", "gripper",
 ]  # fmt: skip
-"""Name of one of UR's interfaces, or of that of a cell's gripper."""
+"""Name of an interface of UR, or of the interface of a cell's gripper."""
 MOST_JOINTS = 6  # number of joints in packages of UR's interfaces; missing joints are 0
 WITHOUT_JOINTS: frozenset[InterfaceName] = frozenset({"dashboard", "interpreter"})
-"""Interfaces without joint values, which suit any number of joints."""
+"""Interfaces that send no joint values, so that they suit any number of joints."""
 Port = Annotated[int, Meta(ge=0, le=65535)]
 
 

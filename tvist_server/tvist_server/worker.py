@@ -1,4 +1,4 @@
-"""One of several processes that serve robots: it obeys the first process and ends with it."""
+"""A process that serves robots or the router: it obeys the first process and ends with that."""
 
 import asyncio
 import os
@@ -65,13 +65,13 @@ News = WorkerRefused | WorkerMade | WorkerReady | WorkerEnded
 
 @dataclass(frozen=True)
 class ParentPipe:
-    """The first process, as seen from another one."""
+    """Connection of a process to the first process."""
 
     pipe: Connection
-    died: Callable[[], None]  # Cleans up after it
+    died: Callable[[], None]  # cleans up after the first process
 
     def receive(self) -> Any:
-        """Wait for its message; False if it has died or wants no robots."""
+        """Wait for a message of the first process; return False if that has died or the message ends this process."""
         try:
             return self.pipe.recv()
         except (EOFError, OSError):
@@ -79,7 +79,7 @@ class ParentPipe:
             return False
 
     def send(self, news: News) -> None:
-        """Send it news, unless it has died."""
+        """Send news to the first process, unless that has died."""
         try:
             self.pipe.send(news)
         except OSError:
@@ -163,8 +163,8 @@ def serve_router(
 def serve_robots(config: ServeConfig, share: Share, parent: ParentPipe) -> None:
     """Serve robots until the first process ends it or dies.
 
-    It makes its robots and reports `WorkerMade`; on the first word it starts them and reports `WorkerReady`;
-    on the last it reports `WorkerEnded`. The first process handles the signals that a terminal sends to all.
+    It creates its robots and sends `WorkerMade`; after the first message, it starts them and sends `WorkerReady`;
+    after the last, it sends `WorkerEnded`. Only the first process reacts to signals, which a terminal sends to all.
     """
     ending = Shutdown()
     ending.close()  # ignores signals

@@ -54,10 +54,10 @@ class _Worker:
     who: str  # description of the process and its robots
     process: multiprocessing.process.BaseProcess
     pipe: Connection
-    ended: WorkerEnded | None = None  # its last news
+    ended: WorkerEnded | None = None  # last news of the process; None until then
 
     def send(self, word: object) -> None:
-        """Send it a word, unless it has died, which `run` reports."""
+        """Send a message to the process. If the process has died, do nothing: `run` reports that."""
         with contextlib.suppress(OSError):
             self.pipe.send(word)
 
@@ -166,7 +166,7 @@ class Workers:
 
     def _start(self, who: str, do: Callable[[ParentPipe], None]) -> _Worker:
         ours, theirs = multiprocessing.Pipe()
-        # A process that keeps another one's pipe open would hide the end of the first process from it.
+        # A process that keeps another process's pipe open would hide the end of the first process from that one.
         rest = [ours, *(worker.pipe for worker in self._front + self._workers)]
         context = multiprocessing.get_context("fork")
         process = context.Process(target=_begin, args=(do, theirs, rest, self._folder))
@@ -231,7 +231,7 @@ def _begin(
 
 
 def _rehearse(setup: Setup) -> None:
-    """Compile and load what a robot needs, for the forked processes to share; a plug-in arm is not made here."""
+    """Compile and load what a robot needs, so that forked processes share it; does not create a plug-in arm."""
     setup = replace(setup, plant=None)
     warm_up()
     Planner(setup).rehearse_scripts()

@@ -1,4 +1,4 @@
-"""The operators, for numbers and for lists of them as vectors and matrices, and access to elements of lists."""
+"""Operators for numbers, vectors and matrices (lists and lists of lists), and access to elements of lists."""
 
 import math
 import operator
@@ -27,7 +27,7 @@ from tvist_urscript.values import (
 MOST_PRODUCTS = 2744  # largest number of multiplications in a product of matrices: two of 14 by 14
 
 Number: TypeAlias = int | float
-Work: TypeAlias = Callable[[int], None]  # called with the number of elements that are about to be computed
+Work: TypeAlias = Callable[[int], None]  # charges for the number of elements about to be computed
 
 
 def _with_overflow(of: Callable[[Any, Any], Number]) -> Callable[[Any, Any], Number]:
@@ -49,7 +49,7 @@ def quotient(a: Number, b: Number) -> Number:
 
 
 def combine(of: Callable[[Any, Any], Value], a: Value, b: Value, done: str, work: Work) -> Value:
-    """Apply a function to two numbers, two lists of equal length, or a list and a number."""
+    """Apply a function to two numbers, to two lists elementwise, or to a number and each element of a list."""
     if type(a) is Array and type(b) is Array:
         return _elementwise(of, a, b, done, work)
     if type(a) in NUMBERS:
@@ -120,7 +120,7 @@ def negate(a: Value, work: Work) -> Value:
 def _scaled(
     a: Array, by: Number, of: Callable[[Any, Any], Value], work: Work, *, turned: bool = False
 ) -> Array:
-    """Compute `of(x, by)`, or `of(by, x)` if turned, for each element x of a list and of lists in it."""
+    """Compute `of(x, by)`, or `of(by, x)` if `turned`, for each element x of a list, also in nested lists."""
     work(len(a.items))
     if of in _PLAIN and only_numbers(a) and not (of is quotient and (turned or by == 0)):
         plain, numbers = _PLAIN[of], a.items
@@ -162,7 +162,7 @@ def _whole(values: Iterable[Any]) -> Array:
 
 
 def _dot(a: list[Number], b: tuple[Number, ...]) -> Number:
-    # Not sum(), which rounds differently in later Pythons.
+    # Not `sum`, which rounds differently in newer versions of Python.
     dot = reduce(operator.add, map(operator.mul, a, b))
     return whole(dot) if type(dot) is int else dot
 
@@ -174,7 +174,7 @@ def _numbers(a: Array) -> list[Number]:
 
 
 def matrix(a: Array) -> list[list[Number]] | None:
-    """Return the rows of a list of lists of numbers; None for a list without lists."""
+    """Return the rows of a matrix (a list of lists of numbers); None for a list without lists."""
     if LISTS.isdisjoint(map(type, a.items)):
         return None
     rows: list[list[Number]] = []
@@ -188,7 +188,7 @@ def matrix(a: Array) -> list[list[Number]] | None:
 _PLAIN: dict[Any, Callable[[Any, Any], Any]] = {
     total: operator.add, difference: operator.sub, _product: operator.mul, quotient: operator.truediv
 }  # fmt: skip
-"""Python's operators for these functions, except for integers beyond 32 bits."""
+"""Python's operator for each of these functions; integer results beyond 32 bits need the function itself."""
 
 
 def element(value: Value, index: Any) -> Value:

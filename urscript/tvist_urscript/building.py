@@ -1,4 +1,4 @@
-"""Build a script's tree bottom-up while it is parsed, without recursion, so that nesting cannot overflow the stack."""
+"""Builds a script's tree bottom-up during parsing, without recursion, so that nesting cannot overflow the stack."""
 
 import re
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ T = TypeVar("T", bound=tree.Node)
 
 @v_args(inline=True)
 class Builder(Transformer[Token, Any]):
-    """Makes a node of each rule's children."""
+    """Creates the node of a grammar's rule from the nodes of its parts."""
 
     def start(self, *children: Any) -> list[tree.Statement]:
         return list(children)

@@ -14,14 +14,14 @@ from tvist_urscript.signatures import Signatures
 def check(text: str, signatures: Signatures) -> list[ScriptError]:
     """Return the errors of a script in the order of the text; an empty list if it can run.
 
-    If the text is not a program, this is one error, at the first token that does not fit. Otherwise it is all
+    If the syntax is wrong, the only error is at the first token that does not fit. Else the errors are all
     unknown names, and all calls that do not fit their functions.
     """
     return translate(text, signatures)[1]
 
 
 def unportable(text: str) -> list[ScriptError]:
-    """Return what runs here but not on a real UR robot, for a script without errors."""
+    """Return what a real UR robot would refuse in a script that has no errors here."""
     program, *inner = scopes(program_of(text))
     assigned = [node for node in _nodes(program.function) if isinstance(node, tree.Assign)]
     own = program.globals - {node.target.name for node in assigned if node.qualifier == "global"}
@@ -50,7 +50,7 @@ def _nodes(*roots: object) -> Iterator[tree.Node]:
 
 
 def _framed_short(text: str) -> list[ScriptError]:
-    """Return the first `end` in column 1 that ends an inner block: a real robot takes the program to end there."""
+    """Return the first `end` in column 1 that ends an inner block: for a real robot, the program ends there."""
     from tvist_urscript.parsing import parse
 
     lines, begun = text.split("\n"), 0

@@ -93,7 +93,7 @@ def program_of(text: str) -> tree.Function:
 
 
 def _is_called_alone(head: tree.Function, statements: list[tree.Statement]) -> bool:
-    """Whether a `def` is followed only by a call of it, as post-processors write a program for a socket."""
+    """Whether only a call of `head` follows its `def`, as in programs that post-processors write for sockets."""
     match statements[1:]:
         case [tree.Evaluate(value=tree.Call(name=name, arguments=[], runs=False))]:
             return head.kind == "def" and name == head.name and not head.parameters
@@ -110,7 +110,7 @@ def _statements(text: str) -> tree.Function:
 
 
 def _parsed(text: str, *, several: bool = False) -> list[tree.Statement]:
-    from tvist_urscript.parsing import parse  # loads the parser library, so not at the start
+    from tvist_urscript.parsing import parse  # loads the parser library, so only when needed
 
     statements = parse(text, several=several)
     if not statements:
@@ -119,7 +119,7 @@ def _parsed(text: str, *, several: bool = False) -> list[tree.Statement]:
 
 
 def _together(text: str, statements: list[tree.Statement]) -> tree.Function:
-    """Make a program of statements, named after the last function among them, or else after the first word."""
+    """Make a program of statements. Its name is that of the last function among them, or else the first word."""
     head = statements[0]
     names = [statement.name for statement in statements if isinstance(statement, tree.Function)]
     word = re.search(r"^[ \t]*([A-Za-z_]\w*)", text, re.MULTILINE)
@@ -128,7 +128,7 @@ def _together(text: str, statements: list[tree.Statement]) -> tree.Function:
 
 
 def _last_lines(body: list[tree.Statement]) -> Iterator[int]:
-    """Yield the lines after which a function does nothing but end."""
+    """Yield the last lines of a function, after which it does nothing more."""
     for statement in reversed(body):
         match statement:
             case tree.Function() | tree.Label() | tree.Return(value=None) | tree.Word(word="halt" | "pass"):
@@ -143,6 +143,6 @@ def _last_lines(body: list[tree.Statement]) -> Iterator[int]:
 
 
 def _code(made: ast.FunctionDef) -> CodeType:
-    """Compile one function alone, so that the interpreter's lock is held only briefly."""
+    """Compile one function, separately from others, so that the interpreter's lock is held only briefly."""
     module = compile(ast.Module([made], []), FILE, "exec", dont_inherit=True, optimize=0)
     return next(constant for constant in module.co_consts if isinstance(constant, CodeType))

@@ -2,7 +2,7 @@
 
 The unit is the time of an operator on two numbers, 0.15 µs where the weights were measured: a budget of 2000
 takes 0.3 ms there, or 0.5 ms if all of it works on lists. Costs are times of calls in this unit, rounded up.
-They do not depend on the machine, so equal programs get equally far in a tick everywhere.
+They are the same on every machine, so a program gets equally far in a tick everywhere.
 """
 
 from collections.abc import Callable

@@ -27,7 +27,7 @@ class ScriptError(Exception):
 class Fault(Exception):  # noqa: N818  it becomes a ScriptError where it is called
     """A function cannot do what a script requests.
 
-    Built-in functions raise it with a readable text; the machine adds the position of the call.
+    Built-in functions raise this error with a readable text; the machine adds the position of the call.
     """
 
 

@@ -32,8 +32,8 @@ class Expressions:
     def __init__(self, signatures: Signatures, report: Report) -> None:
         self.signatures = signatures
         self.report = report
-        self.scope: Scope  # the names that the present function can use
-        self.cost = 0  # evaluations of everything translated since it was reset
+        self.scope: Scope  # names that the function being translated can use
+        self.cost = 0  # evaluations of the code translated since this was reset
         self.works = False  # whether code translated since the reset may work on lists, which costs more
         self.used: set[str] = set()  # built-in functions that the script calls
         self.constants: dict[str, object] = {}  # lists and default values, by their names in compiled code
@@ -70,7 +70,7 @@ class Expressions:
         return located(made, node)
 
     def test(self, node: tree.Expression) -> ast.expr:
-        """Translate an expression of which only the truth is needed."""
+        """Translate an expression of which only the truth value is needed."""
         made: ast.expr
         match node:
             case tree.Logic(operator="xor"):
@@ -121,13 +121,13 @@ class Expressions:
         return ast.Tuple([self.value(node) for node in nodes], LOAD)
 
     def keep(self, value: object) -> str:
-        """Return a name for a value that compiled functions use."""
+        """Store a value that compiled functions use; return the name under which they find the value."""
         name = f"c{self.scope.number}_{len(self.constants)}"
         self.constants[name] = value
         return name
 
     def index(self, node: tree.Index) -> ast.expr:
-        """Translate an element, or a pose: `p[...]` with six expressions."""
+        """Translate access to an element, or a pose, which is `p[...]` with six expressions."""
         value, indices = node.value, node.indices
         is_p = isinstance(value, tree.Name) and value.name == "p"
         if is_p and len(indices) == 6:
@@ -164,7 +164,7 @@ class Expressions:
         return located(self.call(tree.Call(node.line, node.column, name, given), built_in=True), node)
 
     def call(self, node: tree.Call, *, built_in: bool = False) -> ast.expr:
-        """Translate a call; functions of the script hide those of the controller."""
+        """Translate a call; a function of the script hides the controller's function of the same name."""
         self.cost += 1
         scope = None if built_in else self.scope.find(node.name)
         if node.name == "struct" and scope is None:
@@ -197,7 +197,7 @@ class Expressions:
         return ast.YieldFrom(made) if signature.blocks else made
 
     def arguments(self, node: tree.Call, parameters: list[tuple[str, str | None]]) -> list[ast.expr]:
-        """Put a call's arguments into the order of the parameters, but compute them in the order of the text.
+        """Return a call's arguments in the order of the parameters; they are computed in the order of the text.
 
         A parameter is a tuple of its name and the name of its default, or None if it has none.
         """
@@ -272,7 +272,7 @@ class Expressions:
 
 
 def first(node: tree.Expression | tree.Step) -> tree.Node:
-    """Return the part of an expression that has its first token."""
+    """Return the innermost part of an expression that begins with the expression's first token."""
     while True:
         if isinstance(node, tree.Binary):
             node = node.left
@@ -283,7 +283,7 @@ def first(node: tree.Expression | tree.Step) -> tree.Node:
 
 
 def _arranged(given: dict[str, ast.expr], names: list[str]) -> list[ast.expr]:
-    """Return the arguments in the order of the parameters; Python computes them in the given order."""
+    """Return arguments in the order of `names`; the code computes them in the order of `given`."""
     if list(given) == names or all(isinstance(one, ast.Constant | ast.Name) for one in given.values()):
         return [given[parameter] for parameter in names]
     places = {parameter: place for place, parameter in enumerate(given)}

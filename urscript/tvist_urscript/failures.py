@@ -17,7 +17,7 @@ _KINDS = {of.__name__: words for of, words in KINDS.items()}
 
 
 class TooDeep(Fault):
-    """A function has been called too deep; the position is that of the call."""
+    """Calls of functions are nested too deep; the position is that of the last call."""
 
 
 def failure(error: Exception) -> ScriptError:
@@ -36,7 +36,7 @@ def position_of(steps: Any) -> tuple[int, int] | None:
 
 
 def line_of(steps: Any) -> int | None:
-    """Return the line of `position_of`, a hundred times as fast."""
+    """Return only the line of `position_of`, which is a hundred times as fast."""
     frames = _frames(steps)
     return frames[-1].f_lineno or 1 if frames else None
 
@@ -47,13 +47,13 @@ def all_lines_of(steps: Any) -> set[int]:
 
 
 def name_of(steps: Any) -> str | None:
-    """Return the name of the outermost function in which a generator waits, such as that of a thread."""
+    """Return the name of the outermost function in which a generator waits, such as a thread's function."""
     frames = _frames(steps)
     return str(frames[0].f_code.co_name.partition("_")[2]) if frames else None
 
 
 def _frames(steps: Any) -> list[FrameType]:
-    """Return the compiled code's frames in which a generator and the functions that it has called wait."""
+    """Return the frames of compiled code in which a generator, and the functions that it has called, wait."""
     found = []
     while (frame := getattr(steps, "gi_frame", None)) is not None:
         if frame.f_code.co_filename == FILE and frame.f_lasti >= 0:
@@ -78,7 +78,7 @@ def _position(code: CodeType, instruction: int) -> tuple[int, int]:
 
 
 def _is_internal(error: Exception) -> bool:
-    """Whether an exception comes from code that a built-in function calls, so that the arguments are not to blame."""
+    """Whether an exception comes from code behind a built-in function, so that the script is not to blame."""
     *_, frame = [frame for frame, _ in walk_tb(error.__traceback__)]
     module = frame.f_globals.get("__name__", __name__)  # compiled code belongs to no module
     return not (isinstance(error, Fault | RecursionError) or module.startswith("tvist_urscript"))

@@ -12,14 +12,14 @@ DEEPEST_CALLS = 200  # most nested calls of functions
 MOST_PARAMETERS = 255  # most parameters of one function
 MOST_FUNCTIONS = 2000  # most functions and threads of a program
 MOST_STATEMENTS = 4000
-"""Most statements of one function; while Python compiles it, no other thread of the process runs."""
+"""Most statements of one function; while Python compiles a function, no other thread of the process runs."""
 MOST_NODES = 10_000  # most operations, names, calls and statements of one function, for the same reason
 PART, PART_NODES = 200, 1000
-"""Largest part of a long main function, in statements and in the nodes that MOST_NODES counts."""
+"""Most statements, and most nodes (counted as for MOST_NODES), in each part of a long main function."""
 
 
 def too_deep() -> None:
-    """End the program where a function is called too deep."""
+    """End the program if calls are nested too deep."""
     raise TooDeep(f"functions are called more than {DEEPEST_CALLS} deep")
 
 
@@ -29,7 +29,7 @@ class Functions(Statements):
     def function(self, scope: Scope) -> list[ast.FunctionDef]:
         """Translate a function of the script, without those inside it.
 
-        A long main function becomes several: its variables are global, so its statements can stand in any function.
+        A long main function becomes several; this is possible because all its variables are global.
         """
         function = scope.function
         self.scope = scope
@@ -104,7 +104,7 @@ def _definition(at: tree.Node, name: str, parameters: list[str], body: list[ast.
 
 
 def _length(body: list[tree.Statement]) -> int:
-    """Return the number of statements, with those inside of others but without functions."""
+    """Return the number of statements including nested ones, but without those of inner functions."""
     total = 0
     waiting = [body]
     while waiting:

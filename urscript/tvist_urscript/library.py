@@ -27,12 +27,12 @@ WEIGHTS = {
     "binary_list_to_integer": 1, "inv": 9, "make_list": 0, "norm": 1, "normalize": 1, "size": 1, "str_cat": 3,
     "to_str": 3, "transpose": 1,
 }  # fmt: skip
-"""Functions whose cost depends on their list arguments: cost per element."""
+"""Cost per element of list arguments, for the functions whose cost depends on these."""
 
 ANEW: Mapping[str, Callable[[], Callable[..., Any]]] = MappingProxyType({"random": numbers.generator})
-"""Functions with state: factories that create one for each program."""
+"""Functions with a state, each with a factory that creates one function per program."""
 
 PURE: Mapping[str, tuple[Signature, Callable[..., Any]]] = MappingProxyType(
     {name: (signature(function, linear=name in WEIGHTS), function) for name, function in _FUNCTIONS.items()}
 )
-"""Each function with its signature; the machine adds them to the functions of the controller."""
+"""Signature and function of each name; the machine adds these functions to the controller's."""

@@ -1,4 +1,4 @@
-"""Find the ends of statements: indentation and most line breaks have no meaning."""
+"""Finds the ends of statements, since indentation and most line breaks have no meaning in URScript."""
 
 from collections.abc import Iterator
 
@@ -16,7 +16,7 @@ _GOES_ON = frozenset(
     ("PLUS", "MINUS", "STAR", "SLASH", "PERCENT", "COMPARISON", "EQUAL", "AND", "OR", "XOR", "NOT",
      "COMMA", "COLON", "RUN")
 )  # fmt: skip
-"""Tokens after which a line break does not end a statement, since it is incomplete."""
+"""Tokens after which a line break does not end a statement, because the statement is incomplete."""
 _BEGINS = frozenset(
     ("DEF", "SEC", "THREAD", "IF", "WHILE", "RETURN", "KILL", "JOIN", "BREAK", "CONTINUE", "PASS", "HALT",
      "ENTER_CRITICAL", "EXIT_CRITICAL", "GLOBAL", "LOCAL", "END", "ELIF", "ELSE")
@@ -26,13 +26,13 @@ _COMPLETE = frozenset(
     ("NAME", "NUMBER", "TEXT", "TRUE", "FALSE", "NONE", "RPAR", "RSQB", "PASS", "BREAK", "CONTINUE", "HALT",
      "ENTER_CRITICAL", "EXIT_CRITICAL", "END")
 )  # fmt: skip
-"""Tokens after which a name or `run` can only start the next statement on the same line."""
+"""Tokens after which, on the same line, a name or `run` can only be the start of the next statement."""
 _AFTER_NAME = frozenset(("LPAR", "LSQB", "EQUAL", "DOT"))
 """Tokens that may follow the name with which a statement starts."""
 
 
 class Lines:
-    """Converts the tokens of a text to those of the grammar, in which every statement has one end."""
+    """Converts the tokens of a text to those of the grammar, in which one token ends each statement."""
 
     always_accept = (END,)
 
@@ -40,7 +40,7 @@ class Lines:
         self._several = several
 
     def process(self, tokens: Iterator[Token]) -> Iterator[Token]:  # noqa: C901  one pass, since texts can be long
-        """Drop line breaks inside statements, and add the ends of statements that no line break marks."""
+        """Remove line breaks inside statements, and add an end to each statement that ends without a line break."""
         brackets = 0
         last = END
         pending: Token | None = None
@@ -77,7 +77,7 @@ class Lines:
 
 
 def _named(tokens: Iterator[Token]) -> Iterator[Token]:
-    """Turn words after a point, and `sec` in brackets, into names: `time().sec`, `struct(sec=1)`."""
+    """Turn keywords after a point, and `sec` in brackets, into names: `time().sec`, `struct(sec=1)`."""
     last, brackets = END, 0
     for token in tokens:
         brackets += (token.type in _OPENS) - (token.type in _CLOSES)
@@ -87,7 +87,7 @@ def _named(tokens: Iterator[Token]) -> Iterator[Token]:
 
 
 def _parted(tokens: Iterator[Token]) -> Iterator[Token]:
-    """Add an end between two statements on a line, as in UR's interpreter mode: `a = 1 textmsg(a)`."""
+    """Add an end between two statements on one line, which UR's interpreter mode allows: `a = 1 textmsg(a)`."""
     last = END
     name: Token | None = None
     try:
@@ -113,6 +113,6 @@ def _parted(tokens: Iterator[Token]) -> Iterator[Token]:
 
 
 def _after(token: Token) -> Token:
-    """Return an end of statement without text behind a token, the last one of the text."""
+    """Return a token without text that ends a statement, placed after `token`, the last one of the text."""
     line, column = token.end_line, token.end_column
     return Token(END, "", token.end_pos, line, column, line, column)

@@ -18,7 +18,7 @@ from tvist_urscript.values import Value
 EVALUATIONS = 2000
 """Budget of a tick, in evaluations of all threads together."""
 PATIENCE = 1_000_000
-"""Evaluations after which a thread that neither waits nor reads from outside counts as an endless loop."""
+"""Evaluations after which a thread that never waits and receives nothing counts as an endless loop."""
 OVERDRAFT = 2000  # most evaluations by which one statement may exceed the budget
 
 _MISSING = object()
@@ -31,14 +31,14 @@ class Machine:
     Attributes:
         left: Budget left in this tick; compiled code takes from it.
         thread: Number of the thread that runs now, or ran last; 0 is the main thread.
-        halted: Whether it has ended by `halt`.
+        halted: Whether the program has ended by `halt`.
         label: Number and name of the last label that the main thread has passed; None before the first.
 
     Args:
         script: The program.
         functions: The built-in functions that the script calls, without those of `PURE`.
-        finish: Called as a blocking function before a thread waits for another (`join`, `enter_critical`),
-            and at its regular end.
+        finish: Blocking function that each thread calls before it waits for another (`join`, `enter_critical`)
+            and at the end of its function.
 
     Raises:
         ValueError: The script calls a function that is not in `functions`.
@@ -78,17 +78,17 @@ class Machine:
 
     @property
     def running(self) -> bool:
-        """Whether the main thread has not ended."""
+        """Whether the main thread is still running."""
         return not self._main.ended
 
     @property
     def living(self) -> list[int]:
-        """Numbers of the threads that have not ended, oldest first."""
+        """Numbers of the threads that are still running, oldest first."""
         return [thread.number for thread in self._threads if not thread.ended]
 
     @property
     def at_end(self) -> bool:
-        """Whether nothing follows the running built-in function, neither in its thread nor in one that joins it."""
+        """Whether no statement follows the running built-in function, in its thread or in threads that join that."""
         thread, lines = self._running, set[int]()
         frame: FrameType | None = sys._getframe()  # noqa: SLF001
         while frame is not None:
@@ -122,10 +122,10 @@ class Machine:
         return name_of(steps) or self.script.name, line_of(steps) or 1
 
     def resume(self, budget: int = EVALUATIONS) -> int:
-        """Run all threads for one tick: first those without a turn in the last tick, then the others by age.
+        """Run all threads for one tick: first those that had no turn in the last tick, then the others by age.
 
         Args:
-            budget: Evaluations that they may use together.
+            budget: Evaluations that all threads together may use.
 
         Returns:
             The rest of the budget; below 0 if a statement took more, which the next ticks have to pay.
@@ -136,7 +136,7 @@ class Machine:
         self.left, self._held = budget, False
         missed, self._missed = self._missed, []
         self._turns = missed + [thread for thread in self._threads if thread not in missed]
-        for thread in self._turns:  # it grows when a thread starts another
+        for thread in self._turns:  # grows when a thread starts another one
             if thread.ended:
                 continue
             short = self._held or self.left <= 0 or self.left < min(thread.owes, budget)
@@ -147,18 +147,18 @@ class Machine:
         while self._held and (over := [one for one in self._threads if one.joins and one.joins.ended]):
             if not all_lines_of(over[0].steps) <= self.script.last_lines:
                 break
-            self._turn(over[0])  # only its end follows
+            self._turn(over[0])  # the thread only has to end
         return self.left
 
     def hold(self) -> None:
-        """Give no further thread a turn in this tick; the running one continues to its next waiting statement."""
+        """Let no other thread run in this tick; the running one continues until its next statement that waits."""
         self._held = True
 
     def end(self) -> None:
-        """End all threads: GeneratorExit reaches the blocking functions in which they wait.
+        """End all threads: the blocking functions in which they wait get GeneratorExit.
 
         Raises:
-            ScriptError: A blocking function has failed in the process. All threads have ended.
+            ScriptError: A blocking function has failed while it ended. All threads have ended.
         """
         threads, self._threads = self._threads, []
         failed: Exception | None = None
@@ -188,7 +188,7 @@ class Machine:
         try:
             self._step(thread)
         except Exception as error:
-            with suppress(ScriptError):  # only the first error matters to the author
+            with suppress(ScriptError):  # only the first error matters to the script's author
                 self.end()
             if isinstance(error, ScriptError):
                 raise
@@ -214,9 +214,9 @@ class Machine:
             self._waits(thread, why, before)
 
     def _waits(self, thread: Thread, cost: int | None, before: int) -> None:
-        """Note that a thread waits for time or, if `cost` is given, for a budget that can pay its next statements.
+        """Note that a thread waits for the next tick or, if `cost` is given, for a budget that covers this cost.
 
-        `before` is what was left of the budget before its turn.
+        `cost` is that of the thread's next statements; `before` was the budget left before its turn.
         """
         if cost is None:
             thread.spent = 0
@@ -334,7 +334,7 @@ class Machine:
     def _enter(self) -> Steps:
         thread = self._running
         if self._critical.taken_from(thread):
-            yield from self._finish()  # before it queues, since it then gets no turn
+            yield from self._finish()  # before it queues, since it gets no turn while it queues
         if not self._critical.enter(thread):
             yield
 

@@ -28,12 +28,12 @@ class Scope:
     """
 
     function: tree.Function
-    outer: "Scope | None"  # of the function around it; None for the outermost level
+    outer: "Scope | None"  # scope of the function around this one; None for the outermost level
     number: int  # makes the names of compiled functions unique
     globals: set[str]  # global variables, one set for all scopes of the program
-    functions: dict[str, "Scope"] = field(default_factory=dict)  # of its direct inner functions, by name
+    functions: dict[str, "Scope"] = field(default_factory=dict)  # scopes of direct inner functions, by name
     twice: list[tree.Function] = field(default_factory=list)  # inner functions defined twice, an error
-    assigned: set[str] = field(default_factory=set)  # variables assigned in it without `global`
+    assigned: set[str] = field(default_factory=set)  # variables assigned in this function without `global`
     local: set[str] = field(default_factory=set)  # parameters, and variables already declared `local`
 
     @property
@@ -42,7 +42,7 @@ class Scope:
         return f"f{self.number}_{self.function.name}"
 
     def variable(self, name: str) -> Literal["local", "global"] | None:
-        """Return whether a name refers to a local or a global variable here; None if there is none."""
+        """Return whether a name refers to a local or a global variable here; None: to no variable."""
         if name in self.local:
             return "local"
         if name in self.globals:
@@ -50,7 +50,7 @@ class Scope:
         return "local" if name in self.assigned else None
 
     def declare(self, name: str, qualifier: Literal["global", "local"] | None) -> Literal["local", "global"]:
-        """Return whether an assignment sets a local or a global variable; after `local`, the name stays local."""
+        """Return whether an assignment sets a local or a global variable; `local` holds for later assignments, too."""
         if qualifier == "global" or self.outer is None:
             return "global"
         if qualifier == "local":
@@ -58,7 +58,7 @@ class Scope:
         return self.variable(name) or "local"
 
     def find(self, name: str) -> "Scope | None":
-        """Return the scope of the script's function of this name that can be called here; None if there is none."""
+        """Return the scope of the function of this name that can be called here; None: the script has none."""
         scope: Scope | None = self
         while scope is not None:
             if name in scope.functions:
@@ -68,7 +68,7 @@ class Scope:
 
 
 def outline(scope: Scope) -> Scope:
-    """Return a copy of an outermost scope, without function bodies, for statements that are added later."""
+    """Return a copy of an outermost scope without function bodies, which compiles statements added later."""
     known = {
         name: Scope(replace(inner.function, body=[]), None, inner.number, set())
         for name, inner in scope.functions.items()
@@ -79,7 +79,7 @@ def outline(scope: Scope) -> Scope:
 def scopes(program: tree.Function, before: Scope | None = None, number: int = 0) -> list[Scope]:
     """Return the scopes of a program: its outermost level, then its functions in the order of the text.
 
-    Added statements use the outermost scope `before` of their program; `number` is that of the first scope.
+    `before` is the outermost scope of a program to which statements are added; `number` is the first scope's.
     """
     shared: set[str] = set() if before is None else set(before.globals)
     found: list[Scope] = []

@@ -18,8 +18,8 @@ _NUMBERED = re.compile(r"[fc](\d+)_")
 class Namespace:
     """The functions, constants and variables of a program and of the statements that are added to it.
 
-    `functions` are built-in, besides those of `PURE`; `charge` takes a cost from the budget; `machine` has
-    the names that compiled code uses of its machine.
+    `functions` are built-in functions besides those of `PURE`; `charge` takes a cost from the budget; `machine`
+    has what compiled code uses of its machine, by name.
     """
 
     def __init__(
@@ -39,7 +39,7 @@ class Namespace:
         return self._names[name]
 
     def include(self, script: Script) -> None:
-        """Add the functions of a script and what they use."""
+        """Add the functions of a script, and the constants and built-in functions that they use."""
         self._names |= script.constants
         for name in script.used:
             self._names[f"b_{name}"] = self._built_in(name)
@@ -47,7 +47,7 @@ class Namespace:
             self._names[code.co_name] = FunctionType(code, self._names)
 
     def forget(self, before: int, variables: Collection[str]) -> None:
-        """Remove everything that was included after the program, except scopes from `before` on."""
+        """Remove what was added to the program: scopes below number `before`, and globals not in `variables`."""
         for name in self._names.keys() - self._own:
             found = _NUMBERED.match(name)
             of_variable = name.startswith("g_") and name[2:] not in variables
@@ -71,7 +71,7 @@ class Namespace:
             self._charge(weight * sum(argument.size for argument in arguments if isinstance(argument, Array)))
             result = function(*arguments)
             if isinstance(result, Array):
-                self._charge(result.size // 3)  # cheaper, since all elements are created at once
+                self._charge(result.size // 3)  # cheaper per element, since all are created at once
             return result
 
         return charged
@@ -80,7 +80,7 @@ class Namespace:
 def _operators(work: Work) -> Mapping[str, Callable[..., Any]]:
     """Return the operators of a machine, which charge for list elements through `work`.
 
-    Two floats, the most frequent case, take the shortest way.
+    For two floats, the most frequent case, they do the least work.
     """
 
     def add(a: Any, b: Any) -> Any:

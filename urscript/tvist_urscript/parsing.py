@@ -104,7 +104,7 @@ _NEWLINE: "\n"
 %ignore /[ \t\r\f]+/
 %ignore /#[^\n]*/
 """
-"""Grammar for lark; `lines.py` has already reduced line breaks to the ends of statements."""
+"""Grammar for lark; `lines.py` has already replaced line breaks by ends of statements."""
 
 
 @cache
@@ -120,7 +120,7 @@ def _parser(*, several: bool) -> Lark:
 
 
 def parse(text: str, *, several: bool = False) -> list[tree.Statement]:
-    """Return the statements of a text on its outermost level; with `several`, a line may have more than one."""
+    """Return the statements on a text's outermost level; if `several`, a line may have more than one statement."""
     try:
         return cast("list[tree.Statement]", _parser(several=several).parse(text))
     except VisitError as error:

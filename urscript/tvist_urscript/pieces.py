@@ -15,7 +15,7 @@ Made = TypeVar("Made", bound=ast.expr | ast.stmt)
 
 
 def located(made: Made, node: Node) -> Made:
-    """Give a node the position of a node of the script's tree, unless it has one."""
+    """Unless `made` has a position, give it the position of a node of the script's tree."""
     if not hasattr(made, "lineno"):
         made.lineno = made.end_lineno = node.line
         made.col_offset = made.end_col_offset = node.column
@@ -53,7 +53,7 @@ def compare(left: ast.expr, operator: ast.cmpop, right: ast.expr) -> ast.Compare
 
 
 def charge(cost: int, *, check: bool) -> list[ast.stmt]:
-    """Return statements that take a cost from the budget and, with `check`, yield it if the budget is spent.
+    """Return statements that take a cost from the budget and, with `check`, yield the cost if the budget is spent.
 
     The machine charges a yielded cost to a later tick.
     """

@@ -1,4 +1,4 @@
-"""A compiled script, in a module that does not import the compiler."""
+"""Compiled scripts; this module does not import the compiler."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -21,10 +21,10 @@ class Script:
         functions: Code of its functions.
         constants: Values that the code uses by name.
         used: Built-in functions that it calls.
-        scope: Meaning of the names on its outermost level.
-        scopes: Number of its scopes, including those of the program that it is added to.
+        scope: Scope of its outermost level.
+        scopes: Number of its scopes, including those of the program to which the script is added.
         idle: Whether it only defines functions, so that it ends at once.
-        last_lines: Lines of its functions after which they do nothing but end.
+        last_lines: Last lines of its functions, after which they do nothing more.
     """
 
     name: str
@@ -40,5 +40,5 @@ class Script:
     last_lines: frozenset[int] = frozenset()
 
     def forgetting(self, last: "Script") -> "Script":
-        """Return the program for later statements, which cannot use anything added up to `last`."""
+        """Return the program to which later statements are added; they cannot use anything added up to `last`."""
         return replace(self, scopes=last.scopes)

@@ -27,8 +27,8 @@ class Signature:
         blocks: Whether it is a generator function. Each bare `yield` in it waits for the next tick; its
             return value is the value of the call.
         cost: Evaluations that a call takes from the budget.
-        linear: Whether the elements of list arguments and results are taken from the budget as well. The
-            machine does this for the functions that it adds itself.
+        linear: Whether a call also takes a cost for the elements of list arguments and results. The
+            machine charges for this in the functions that it adds itself.
     """
 
     parameters: tuple[Parameter, ...]
@@ -48,7 +48,7 @@ Signatures = Mapping[str, Signature]
 def signature(function: Callable[..., Any], *, linear: bool = False) -> Signature:
     """Return how scripts call a Python function: its parameters' names and defaults, and its cost by `costs`.
 
-    It blocks if its annotation says that it returns a generator or, without one, if it is a generator
+    The function blocks if it is annotated to return a generator or, without annotation, is a generator
     function.
 
     Args:
@@ -68,7 +68,7 @@ def signature(function: Callable[..., Any], *, linear: bool = False) -> Signatur
 
 
 def names(functions: type) -> list[str]:
-    """Return the names of the public methods of a class, in their order."""
+    """Return the names of the public methods of a class, in the order of their definition."""
     return [
         name
         for name, method in vars(functions).items()
@@ -77,7 +77,7 @@ def names(functions: type) -> list[str]:
 
 
 def signatures(functions: type) -> dict[str, Signature]:
-    """Return the signatures of the public methods of a class by name, in their order."""
+    """Return the signatures of the public methods of a class by name, in the order of their definition."""
     # Bound to any object, since scripts do not give `self`.
     return {name: signature(vars(functions)[name].__get__(functions)) for name in names(functions)}
 

@@ -13,7 +13,7 @@ from tvist_urscript.signatures import Signatures
 PIECE = 40  # evaluations after which code without loops checks whether the budget is spent
 MOST_LOOPS = 15  # most nested loops: CPython allows 20 nested blocks
 LINK = 15
-"""Most branches of one Python `if`; a longer `elif` chain is split, since Python nests each in the one before."""
+"""Most branches of one Python `if`; longer chains are split, since Python nests each `elif` in the previous one."""
 
 Branch = tuple[tree.Expression, list[tree.Statement]]
 Link = tuple[tree.Node, ast.expr, list[ast.stmt]]
@@ -26,15 +26,15 @@ class Statements(Expressions):
         super().__init__(signatures, report)
         self.globals: set[str] = set()  # global variables that the present function sets
         self.loops = 0  # number of loops around the present statement
-        # Whether the statement is in a part of a long main function, which returns True after a `return`.
+        # Whether the statement is in a part of a long main function; a part returns True after a `return`.
         self.is_part = False
         self.temporary = count()
 
     def block(self, body: list[tree.Statement], since: int, cost: int = 0) -> tuple[list[ast.stmt], int]:
-        """Translate statements; return them and the most evaluations since the budget was last checked.
+        """Translate statements; return them, and the most evaluations from the budget's last check to their end.
 
-        Before them this number is `since`; `cost` is the cost of code before them, such as conditions, not
-        yet charged.
+        `since` is this number at their beginning; `cost` is the cost of code before them, such as conditions,
+        that is not charged yet.
         """
         result: list[ast.stmt] = []
         piece: list[ast.stmt] = []
@@ -92,9 +92,9 @@ class Statements(Expressions):
         return self.cost
 
     def branches(self, statement: tree.If, test: ast.expr, since: int) -> tuple[list[ast.stmt], int]:
-        """Translate the branches of an `if`, whose first condition is charged already; see `block`.
+        """Translate the branches of an `if`, whose first condition `test` is charged already; see `block`.
 
-        Each branch charges the conditions evaluated before it.
+        Each branch charges the other conditions that are evaluated before it.
         """
         chains = [
             statement.branches[start : start + LINK] for start in range(0, len(statement.branches), LINK)
@@ -128,10 +128,10 @@ class Statements(Expressions):
     def links(
         self, statement: tree.If, chain: list[Branch], test: ast.expr, since: int, cost: int
     ) -> tuple[list[Link], int, int, int]:
-        """Translate one chain of branches (see LINK), whose first condition is charged already.
+        """Translate one chain of branches (see LINK), whose first condition `test` is charged already.
 
-        Return them, the cost to charge if none is taken, the largest `since` at the end of any, and that if
-        none is taken.
+        Return the branches; the cost to charge if no branch is taken; and `since` (see `block`) after the chain:
+        its largest value if a branch is taken, and its value if none is.
         """
         links: list[Link] = []
         latest = since
@@ -189,7 +189,7 @@ class Statements(Expressions):
                 raise AssertionError(statement)
 
     def assign(self, statement: tree.Assign) -> ast.stmt:
-        """Translate an assignment; the value is computed before the variable is read or declared."""
+        """Translate an assignment; its value is computed before the target is read or declared."""
         target, indices = statement.target.name, statement.indices
         plain = [index for index in indices if not isinstance(index, tree.Step)]
         if indices and len(plain) == len(indices) and self.built_in_array(statement.target):
@@ -203,7 +203,7 @@ class Statements(Expressions):
             self.cost += len(indices)
             self.works = True
             places: list[ast.expr] = [
-                # A tuple marks a member, since no value of a script is one.
+                # A tuple marks a member, since no value of a script is a tuple.
                 ast.Tuple([ast.Constant(index.name)], LOAD)
                 if isinstance(index, tree.Step)
                 else self.value(index)

@@ -70,7 +70,7 @@ def to_num(str: Value) -> int | float:
 
 
 def _check_place(place: int, string: bytes, beyond: int = 0) -> None:
-    """Raise Fault unless a place is in a string, or by at most `beyond` bytes behind it."""
+    """Raise Fault unless a position is in a string, or at most `beyond` bytes after its last one."""
     if not 0 <= place < len(string) + beyond:
         raise Fault(f"text index {place} is not in the text, which has {len(string)} bytes")
 

@@ -12,7 +12,7 @@ class Halted(Exception):  # noqa: N818  no error: the script has executed `halt`
 
 
 class Killed(Exception):  # noqa: N818  no error: the script has killed the thread that runs
-    """Raised to unwind the running thread if it has killed itself or one of its ancestors."""
+    """Raised to unwind the running thread if this thread has killed itself or one of its ancestors."""
 
 
 def halt() -> None:
@@ -25,13 +25,13 @@ class Thread:
     """A thread of a script."""
 
     number: int  # 0 for the main thread; numbers are never reused
-    steps: Generator[Any, None, Any] | None  # runs it; None when it has ended
-    parent: "Thread | None"  # the thread that started it, or that one's nearest living ancestor
-    critical: int = 0  # number of critical sections it is in
-    spent: int = 0  # evaluations since it waited for time to pass or received something from outside
-    owes: int = 0  # evaluations of its first statements in its next turn, charged to that tick
+    steps: Generator[Any, None, Any] | None  # runs the thread; None when it has ended
+    parent: "Thread | None"  # thread that started it or, if that has ended, its nearest living ancestor
+    critical: int = 0  # number of critical sections that it has entered
+    spent: int = 0  # evaluations since it last waited for a tick or received something
+    owes: int = 0  # evaluations of the statements that begin its next turn, charged then
     joins: "Thread | None" = None  # the thread for whose end it waits
-    added: bool = False  # whether it belongs to added statements, or as the main thread runs them now
+    added: bool = False  # whether added statements have started it, or it is the main thread running them
 
     @property
     def ended(self) -> bool:
@@ -48,9 +48,9 @@ class Thread:
         return False
 
     def leave(self, others: "Iterable[Thread]") -> None:
-        """Mark the thread as ended, and hand the threads that it started to its parent.
+        """Mark the thread as ended; its parent becomes the parent of the threads that it started.
 
-        `kill` of the parent thus still reaches them, and the ended thread need not be kept.
+        So killing the parent still ends them, and the ended thread need not be kept.
         """
         self.steps = None
         for other in others:
@@ -59,13 +59,13 @@ class Thread:
 
 
 class CriticalSection:
-    """The critical section of a program: its holder keeps it until it leaves, or waits for time to pass."""
+    """The critical section of a program. Its holder keeps it until the holder leaves or waits for a tick."""
 
     def __init__(self) -> None:
         self._holder: Thread | None = None
 
     def admits(self, thread: Thread) -> bool:
-        """Return whether a thread may run; one inside the section takes it if it is free."""
+        """Return whether a thread may run; a thread inside takes the section if that is free."""
         if thread.critical and self._holder is None:
             self._holder = thread
         return not thread.critical or self._holder is thread
@@ -75,17 +75,17 @@ class CriticalSection:
         return self._holder is not None and self._holder is not thread
 
     def enter(self, thread: Thread) -> bool:
-        """Put a thread inside; return whether it may run on."""
+        """Put a thread inside the section; return whether the thread may continue."""
         thread.critical += 1
         return self.admits(thread)
 
     def leave(self, thread: Thread) -> None:
-        """Take a thread out, once for each `enter`."""
+        """Undo one `enter` of a thread."""
         thread.critical = max(thread.critical - 1, 0)
         if not thread.critical:
             self.release(thread)
 
     def release(self, thread: Thread) -> None:
-        """Let others in if this thread holds the section."""
+        """If this thread holds the section, let other threads take it."""
         if self._holder is thread:
             self._holder = None

@@ -1,4 +1,4 @@
-"""A script as a tree, whose nodes have the positions of the tokens that errors refer to."""
+"""The syntax tree of a script; each node has the position of the token that errors refer to."""
 
 from dataclasses import dataclass, field
 from typing import Literal
@@ -8,10 +8,10 @@ from typing import Literal
 class Node:
     """A part of a script."""
 
-    line: int  # of its token, from 1
-    column: int  # likewise
+    line: int  # line of its token, from 1
+    column: int  # column of its token, from 1
     depth: int = field(default=1, init=False)  # levels of nodes below it
-    size: int = field(default=1, init=False)  # nodes including those below it, except constants and functions
+    size: int = field(default=1, init=False)  # number of nodes from it down, without constants and functions
 
 
 @dataclass(slots=True)
@@ -45,7 +45,7 @@ class Index(Node):
 
 @dataclass(slots=True)
 class Member(Node):
-    """`a.name`; its position is that of the name."""
+    """`a.name`, with the position of `name`."""
 
     value: "Expression"
     name: str
@@ -53,7 +53,7 @@ class Member(Node):
 
 @dataclass(slots=True)
 class Method(Node):
-    """`a.name(arguments)`; its position is that of the name."""
+    """`a.name(arguments)`, with the position of `name`."""
 
     value: "Expression"
     name: str
@@ -94,7 +94,7 @@ class Unary(Node):
 
 @dataclass(slots=True)
 class Binary(Node):
-    """Arithmetic or a comparison; its position is that of the operator."""
+    """Arithmetic or a comparison, with the position of the operator."""
 
     operator: str
     left: "Expression"
@@ -177,7 +177,7 @@ class Label(Node):
 
 @dataclass(slots=True)
 class Function(Node):
-    """A function, a thread, or a whole program; its position is that of its name."""
+    """A function, a thread, or a whole program, with the position of its name."""
 
     kind: Literal["def", "sec", "thread"]
     name: str

@@ -151,7 +151,7 @@ def number(value: Any, what: str) -> int | float:
 
 
 def integer(value: Any, what: str) -> int:
-    """Return the value as an integer, also if it is a float such as 3.0, since `/` gives floats; else raise Fault."""
+    """Return an integer, or a whole float such as 3.0 (`/` gives floats) as an integer; otherwise raise Fault."""
     if type(value) is int:
         return value
     if type(value) is float and value.is_integer() and LOWEST <= value <= HIGHEST:
@@ -162,7 +162,7 @@ def integer(value: Any, what: str) -> int:
 
 
 def exactly(wanted: type[T], value: Any, what: str) -> T:
-    """Return the value if its type is exactly the wanted one, such as a list but no pose; else raise Fault."""
+    """Return the value if its type is exactly `wanted` (a pose, for example, is no list); otherwise raise Fault."""
     if type(value) is wanted:
         return value
     raise Fault(f"{what} has to be {KINDS[wanted]}, not {kind(value)}")
@@ -191,7 +191,7 @@ def only_numbers(value: Array) -> bool:
 
 
 def whole(value: int) -> int | float:
-    """Return an integer as it is if it has 32 bits, else as a float."""
+    """Return an integer unchanged if it fits into 32 bits, else as a float."""
     return value if LOWEST <= value <= HIGHEST else float(value)
 
 
@@ -204,7 +204,7 @@ def short(value: str) -> str:
 
 
 def to_bytes(value: str) -> bytes:
-    """Encode a string as UTF-8; surrogates, which stand for parts of a character, become the original bytes."""
+    """Encode a string as UTF-8; surrogates, which stand for bytes of incomplete characters, become these bytes."""
     try:
         return value.encode(errors="surrogateescape")
     except UnicodeEncodeError:
@@ -212,7 +212,7 @@ def to_bytes(value: str) -> bytes:
 
 
 def to_text(value: bytes) -> str:
-    """Decode UTF-8; parts of a character become surrogates."""
+    """Decode UTF-8; bytes of incomplete characters become surrogates."""
     return value.decode(errors="surrogateescape")
 
 

@@ -17,7 +17,7 @@ def completion(shell: Literal["bash", "zsh", "fish"]) -> None:
     Args:
         shell: Write the script for this shell.
     """
-    from tvist_cli.main import OF_GROUPS, application  # which imports nothing of the commands before
+    from tvist_cli.main import OF_GROUPS, application  # it imports a command only when called
 
     script = application().generate_completion(prog_name="tvist", shell=shell)
     # cyclopts' script for bash takes `bench` in `tvist study bench` for the command `bench`.

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 FOLDER = Path("tvist-demo")
 ANSWERED = "Q1-Q3"
-"""Motion of the overview figure: the arm's frequency doubles along it, and the ringing is easy to see."""
+"""Motion of the overview figure: the arm's frequency doubles during it, and the vibration is easy to see."""
 TERMS = {
     "f_d, ζ": "frequency at which the arm vibrates, and its damping ratio: 0 rings for ever, 1 does not swing back",
     "shaped": "the command is split into two, half a period of the vibration apart, so that their vibrations cancel",
@@ -145,7 +145,7 @@ def _figures(result: "ServedExperiment", folder: Path, look: FigureOptions) -> P
 
 
 def _say(result: "ServedExperiment", overview: Path, recording: Path) -> None:
-    """Print the answer and four commands that can be copied as they are, each on one line."""
+    """Print the result of the experiment, and four commands to try next, each on one line for copying."""
     from tvist_lab.studies.paper.answer import answer, checks, terms
 
     for line in answer(result.report, ANSWERED):
@@ -167,7 +167,7 @@ def _say(result: "ServedExperiment", overview: Path, recording: Path) -> None:
 
 
 def _print_paper(result: dict[str, Any]) -> None:
-    """Print the results of `tvist demo`: the tables of each arm, and the origins of its figures."""
+    """Print the tables of each arm, and where each figure in them comes from."""
     from tvist_lab.studies.paper.report import MEANINGS, beside
 
     arms = [result, *result.get("others", ())]

@@ -101,7 +101,7 @@ def identify(
     look.check(figures)
     if output is None:
         output = default_output(Path("robot.toml")) if twin else Path("calibration.json")
-    if not output.absolute().parent.is_dir():  # said before half an hour of jogs
+    if not output.absolute().parent.is_dir():  # checked before the jogs, which take half an hour
         raise Misuse(f"output is {output}: its folder does not exist, make it first")
     from tvist_cli import identifying
 

@@ -96,7 +96,7 @@ def move(
 
 
 def _checked(target: str, *, line: bool, by: bool, degrees: bool) -> tuple[float, ...]:
-    """Check the target before the robot is contacted; return its numbers with --line, else nothing."""
+    """Check the target before the robot is contacted; return its numbers if `line`, else no numbers."""
     if line:
         return _tool_numbers(target, by=by, degrees=degrees)
     if by:
@@ -107,7 +107,7 @@ def _checked(target: str, *, line: bool, by: bool, degrees: bool) -> tuple[float
 
 
 def _pose(text: str, poses: Mapping[str, tuple[float, ...]], *, degrees: bool) -> tuple[float, ...]:
-    """Return the joint angles [rad] of a named pose, in any case, or of angles separated by commas."""
+    """Return joint angles [rad], given by a pose's name in upper or lower case, or as numbers with commas."""
     for name, q in poses.items():
         if name.lower() == text.strip().lower():
             return q
@@ -120,7 +120,7 @@ def _pose(text: str, poses: Mapping[str, tuple[float, ...]], *, degrees: bool) -
 
 
 def _tool_numbers(text: str, *, by: bool, degrees: bool) -> tuple[float, ...]:
-    """Parse a target of the tool: displacement or position [m], or position [m] and rotation vector [rad]."""
+    """Parse a target of the tool: displacement (`by`) or position [m], or position and rotation vector [rad]."""
     numbers = _numbers(text)
     if len(numbers) not in ({3} if by else {3, 6}):
         pose = f"a position x,y,z in m, or x,y,z,rx,ry,rz in m and {'degrees' if degrees else 'rad'}"
@@ -131,7 +131,7 @@ def _tool_numbers(text: str, *, by: bool, degrees: bool) -> tuple[float, ...]:
 
 
 def _numbers(text: str) -> tuple[float, ...]:
-    """Parse numbers separated by commas; return nothing if the text is anything else."""
+    """Parse numbers separated by commas; return no numbers if the text is anything else."""
     try:
         numbers = tuple(float(number) for number in text.split(","))
     except ValueError:

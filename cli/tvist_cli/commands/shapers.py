@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 F_D = 10.0  # damped frequency of the mode in the list [Hz]
 ERRORS = (-40.0, 60.0)  # range of frequency errors for --sensitivity [%]
 BANDS = {"5": 0.05, "10": 0.1}  # residual vibration that bounds each band [-], by its percentage
-TOUCHING = 1.0 + 1e-4  # factor on the bound, so that rounding does not exclude a hump that just reaches it
+TOUCHING = 1.0 + 1e-4  # factor on the bound: rounding must not exclude a peak that just reaches the bound
 
 
 def shapers(
@@ -119,7 +119,7 @@ def _list(entries: list[dict[str, Any]]) -> None:
 
 
 def _about(shaper: "AnyShaper", f_d: float, zeta: float) -> dict[str, Any]:
-    """Return the properties of a shaper, or why it does not support this mode."""
+    """Return a shaper's properties for a mode, or why the shaper does not support the mode."""
     from tvist_shaping import ShapingError
     from tvist_shaping.failures import FAILURES, words
     from tvist_shaping.impulse_train import check_mode
@@ -147,7 +147,7 @@ def _about(shaper: "AnyShaper", f_d: float, zeta: float) -> dict[str, Any]:
 
 
 def _band(impulses: "Impulses", f_d: float, V: float, zeta: float) -> list[float | None] | None:
-    """Return the band's lowest and highest f/f_d; None if f_d is outside, or as the highest if it has no end."""
+    """Return lowest and highest f/f_d of the band around f_d (highest None: unbounded); None: f_d is outside."""
     from tvist_shaping import band
 
     low, high = (f / f_d for f in band(impulses, f_d, zeta, V * TOUCHING))

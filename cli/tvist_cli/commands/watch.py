@@ -23,9 +23,9 @@ from tvist_protocol import Event, RobotMode, SafetyMode, State, Telemetry
 
 REFRESH_S = 0.1  # time between two readings of states [s]
 FLEET_EVERY = 1.0  # time between two readings of a fleet [s]
-STALE_S = 1.0  # age above which a newest state is shown in red [s]
+STALE_S = 1.0  # age above which the newest state of a robot is shown in red [s]
 
-Frame = tuple[Sequence[Any], RenderableType]  # one reading: the objects that --json prints, and the screen
+Frame = tuple[Sequence[Any], RenderableType]  # for one refresh: objects that --json prints, and screen
 
 
 def watch(
@@ -66,7 +66,7 @@ def watch(
 
 
 def _only_robot(at: Connection) -> Connection | None:
-    """Return the only robot in a namespace or below it; None if there are several, or none."""
+    """Return the connection to the only robot in or below a namespace; None unless there is exactly one."""
 
     async def find() -> Connection | None:
         async with Fleet(at.endpoint, security=at.security, namespace=at.namespace) as fleet:
@@ -80,7 +80,7 @@ def _only_robot(at: Connection) -> Connection | None:
 
 
 async def _show(frames: AsyncIterator[Frame], every: float, *, json: bool) -> None:
-    """Print each reading as JSON, or show it on the screen, with pauses [s]."""
+    """Print each frame as JSON or show it on the screen; pause for `every` after each [s]."""
     with contextlib.ExitStack() as stack:
         live: Live | None = None
         async for objects, screen in frames:
@@ -110,7 +110,7 @@ async def _robot_frames(at: Connection, *, json: bool) -> AsyncIterator[Frame]:
         async for state in robot.states(buffer=1):
             now = (state.robot_mode, state.safety_mode)
             if not json and now != modes:
-                modes = now  # first, since an event may come meanwhile
+                modes = now  # set before waiting, since an event may reset this meanwhile
                 line = _standing(await look(robot, at.unlock_command(str(at.name))))
             yield [state], _robot_screen(state, events[-5:], line, load)
 
@@ -232,7 +232,7 @@ def _states_table(newest: Mapping[RobotPlace, NewestState], seconds: float) -> T
 
 
 def _columns(*numbers: str, words: tuple[str, ...] = ()) -> Table:
-    """Return an empty table with text columns and then number columns; robot names are never cut."""
+    """Return an empty table with the columns `words` of texts, then `numbers`; robot names are never cut."""
     drawn = Table(show_edge=False, pad_edge=False)
     for title in words:
         drawn.add_column(title, no_wrap=title == "robot")

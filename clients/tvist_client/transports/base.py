@@ -1,4 +1,4 @@
-"""Interface between a client and the network: it carries bytes to and from one robot."""
+"""Interface of transports, which carry bytes between a client and one robot."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable

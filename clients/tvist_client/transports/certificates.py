@@ -19,9 +19,9 @@ from tvist_client.errors import NotConnectedError
 
 AUTHORITY, CERTIFICATE, KEY = "authority.pem", "client.pem", "client.key"
 OPEN_MS = 15_000
-"""Longest time to open a session [ms], because a hundred connections abandoned at once delay the next one by 10 s."""
+"""Longest time to open a session [ms]; if a hundred connections fail at once, the server delays the next by 10 s."""
 PROBE_S = 4.0
-"""Longest wait in a probe [s]: twice what a robot without certificates waits for the rest of a supposed message."""
+"""Longest wait in a probe [s]: twice the time for which a robot without TLS waits for the rest of a message."""
 
 Folder = str | os.PathLike[str]
 
@@ -55,9 +55,9 @@ def settings(endpoint: str, security: Folder | None) -> dict[str, Any]:
 
 
 def why_refused(endpoint: str, security: Folder | None, whose: str = "robot") -> str | None:
-    """Return why no session could be opened, found by a separate handshake, because Zenoh does not report it.
+    """Return why no session could be opened. Zenoh does not report this, so a separate handshake finds it out.
 
-    This blocks for at most three times `PROBE_S`; None: another cause, such as that no server listens. `whose` is for
+    Blocks for at most three times `PROBE_S`. None: another cause, such as that no server listens. `whose` is for
     messages.
     """
     protocol, _, address = re.split("[?#]", endpoint)[0].partition("/")
@@ -91,7 +91,7 @@ def why_refused(endpoint: str, security: Folder | None, whose: str = "robot") ->
 def _handshake(address: str, security: Folder | None) -> tuple[bool, OSError | None]:
     """Return whether the peer uses TLS, and the error that ended the handshake; may raise ssl.SSLError or OSError."""
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
-    if security is None:  # nothing is sent, so any peer is acceptable
+    if security is None:  # no secrets are sent, so any peer is acceptable
         context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
     else:
         context.load_verify_locations(Path(security) / AUTHORITY)
@@ -104,14 +104,14 @@ def _handshake(address: str, security: Folder | None) -> tuple[bool, OSError | N
         try:
             _carry(link.do_handshake, plain, received, to_send)
             encrypted = True
-            # In TLS 1.3 a server judges the client's certificate after the handshake: read its verdict.
+            # In TLS 1.3 a server checks the client's certificate after the handshake: read its answer.
             with contextlib.suppress(ssl.SSLEOFError, ssl.SSLZeroReturnError):
                 _carry(lambda: link.read(1), plain, received, to_send)
         except TimeoutError:
             if not encrypted:
                 raise
         except OSError as error:
-            alert = "ALERT" in (getattr(error, "reason", None) or "")  # only a peer that uses TLS sends one
+            alert = "ALERT" in (getattr(error, "reason", None) or "")  # only TLS peers send an alert
             return encrypted or alert or isinstance(error, ssl.SSLCertVerificationError), error
     return encrypted, None
 
@@ -119,7 +119,7 @@ def _handshake(address: str, security: Folder | None) -> tuple[bool, OSError | N
 def _carry(
     step: Callable[[], object], plain: socket.socket, received: ssl.MemoryBIO, to_send: ssl.MemoryBIO
 ) -> None:
-    """Carry bytes between a socket and TLS until one of its steps is done."""
+    """Carry bytes between a socket and a TLS object until `step` of the object succeeds."""
     while True:
         with contextlib.suppress(ssl.SSLWantReadError):
             step()

@@ -19,14 +19,14 @@ class InProcessRobot(Protocol):
         """Take an encoded set-point."""
 
     def subscribe(self, topic: Topic, callback: Callable[[bytes], None]) -> Callable[[], None]:
-        """Call a function for each message of a topic, first the present one; calling the result ends this."""
+        """Call a function with each message of a topic, first with the present one; the returned function ends this."""
 
     def info(self) -> bytes:
         """Return the encoded `info`."""
 
 
 class LoopbackTransport(Transport):
-    """A connection to the robot `host` in this process, which knows this client as `client`."""
+    """A connection to the robot `host` in this process, with `client` as this client's name."""
 
     def __init__(self, host: InProcessRobot, client: str = "client") -> None:
         self._host = host

@@ -20,7 +20,7 @@ from tvist_protocol.keys import check_namespace
 
 _PORT = "[1-9]\\d{0,3}|[1-5]\\d{4}|6[0-4]\\d{3}|65[0-4]\\d{2}|655[0-2]\\d|6553[0-5]"
 _ENDPOINT = re.compile(rf"(?!(tcp|tls|udp|quic|ws)/)[a-z]+[/-].*|[a-z]+/\S+:({_PORT})([?#].*)?")
-"""Matches endpoints with a valid port, and those of protocols without ports, which Zenoh checks itself."""
+"""Matches endpoints with a valid port, and those of protocols without ports (Zenoh checks them itself)."""
 ENCODING = zenoh.Encoding("application/msgpack")
 CONFIG: Mapping[str, Any] = {
     "mode": "client",
@@ -32,7 +32,7 @@ CONFIG: Mapping[str, Any] = {
 
 
 def open_session(endpoint: str, security: Folder | None = None, namespace: str = "") -> zenoh.Session:
-    """Open a session, whose keys omit the namespace. Blocks while it connects."""
+    """Open a session, in which keys are written without the namespace. Blocks until it is connected."""
     invalid = (
         f"{quoted(endpoint)} is not an endpoint: it must have the form tcp/<host>:<port>, such as "
         "tcp/127.0.0.1:7447, with a port from 1 to 65535"
@@ -60,9 +60,9 @@ def open_session(endpoint: str, security: Folder | None = None, namespace: str =
 def ask(
     session: zenoh.Session, key: str, data: bytes | None, timeout_s: float
 ) -> asyncio.Future[zenoh.Reply | None]:
-    """Query one key, on the loop; the result is the first answer, or None if nobody answers.
+    """Query one key, from the loop. The result is the first answer, or None if nobody answers.
 
-    Zenoh ends a query that reaches no queryable at once, and an unanswered one with an error at its timeout.
+    If a query reaches no queryable, Zenoh ends it at once; if it is not answered, with an error at its timeout.
     """
     loop = asyncio.get_running_loop()
     answer: asyncio.Future[zenoh.Reply | None] = loop.create_future()

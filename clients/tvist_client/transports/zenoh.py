@@ -27,8 +27,8 @@ from tvist_client.transports.session import ENCODING, ask, close_session, open_s
 from tvist_protocol import keys
 
 FIND_S = 1.0
-"""Time after which the present robots are queried, once there is a link [s]; a robot appears within milliseconds."""
-LATE_S = 3.0  # time after which they are queried again if none answered, because the machine may be busy [s]
+"""Time after the link is open at which robots are queried [s]; present robots appear within milliseconds."""
+LATE_S = 3.0  # time until they are queried again if none answered [s]; the machine may be busy
 INFO_S = 10.0  # longest wait for `info` [s]
 
 
@@ -85,7 +85,7 @@ class ZenohTransport(Transport):
         try:
             return await self._get(keys.key(self._robot, "command"), data, timeout_s)
         except NotConnectedError:
-            # If the robot was present all the time and still answers, access control has dropped the command.
+            # If the robot was present all the time and answers now, access control must have dropped the command.
             if self._endpoint.startswith("tls/") and self._alive.is_set():
                 await self.info()
                 if self._losses == losses:
@@ -198,9 +198,9 @@ class ZenohTransport(Transport):
                     await self._alive.wait()
                 return
             robots = await _robots(self._session)
-            if self._robot in robots:  # it appeared late because the machine is slow
+            if self._robot in robots:  # the robot appeared late because the machine is slow
                 return
-            with suppress(NotConnectedError):  # it has no token while it starts, but answers
+            with suppress(NotConnectedError):  # a robot that is starting answers but has no token
                 await self.info()
                 return
             if robots:
@@ -224,7 +224,7 @@ async def robots_at(endpoint: str, security: Folder | None = None, namespace: st
 
 
 async def only_robot(endpoint: str, wanted: str, security: Folder | None = None, namespace: str = "") -> str:
-    """Choose a robot if no name is given: the preferred one, or if that is absent, the only one."""
+    """Return `wanted` if there is a robot of that name, else the name of the only robot."""
     robots = await robots_at(endpoint, security, namespace)
     if wanted in robots or not robots:
         return wanted
@@ -236,7 +236,7 @@ async def only_robot(endpoint: str, wanted: str, security: Folder | None = None,
 
 
 async def _opened(endpoint: str, security: Folder | None, namespace: str) -> zenoh.Session:
-    """Open a session; if this is cancelled, close it again, because a server has few places."""
+    """Open a session; if this is cancelled, close the session again, because a server admits few."""
     opening = asyncio.create_task(asyncio.to_thread(open_session, endpoint, security, namespace))
     try:
         return await asyncio.shield(opening)

@@ -25,7 +25,7 @@ MESSAGES = (
 
 
 def access_control(robots: Sequence[str], roles: Mapping[str, Role], namespace: str = "") -> dict[str, Any]:
-    """Return Zenoh's `access_control` settings for a server with certificates; no role (by common name), no access."""
+    """Return Zenoh's `access_control` settings for a server with certificates. Without a role: no access."""
     robots = [_at(namespace, robot) for robot in robots]
     viewing, operating = _viewing(robots), _operating(robots)
     rules_of: dict[Role, list[Rule]] = {"viewer": viewing, "operator": [*viewing, *operating]}
@@ -75,14 +75,14 @@ def router_access(roles: Mapping[str, Role]) -> dict[str, Any]:
 def with_robots_behind(
     access: Mapping[str, Any], robots: Sequence[str], namespace: str, protocol: str
 ) -> dict[str, Any]:
-    """Return `access_control` settings that also admit the robots' own processes, over a protocol only they can use."""
+    """Return `access` extended for the processes of robots, which connect over a `protocol` that only they can use."""
     own = _serving([_at(namespace, robot) for robot in robots], "robots")
     more = _settings(own, [({"id": "robots", "link_protocols": [protocol]}, own)])
     return {**access, **{part: [*access[part], *more[part]] for part in ("rules", "subjects", "policies")}}
 
 
 def _settings(rules: list[Rule], granted: Sequence[tuple[Rule, list[Rule]]]) -> dict[str, Any]:
-    """Return settings with these rules, of which each subject is granted some; everything else is denied."""
+    """Return settings with these rules; `granted` has each subject with its rules. All else is denied."""
     return {
         "enabled": True,
         "default_permission": "deny",
@@ -96,7 +96,7 @@ def _settings(rules: list[Rule], granted: Sequence[tuple[Rule, list[Rule]]]) -> 
 
 
 def _serving(places: Sequence[str], name: str) -> list[Rule]:
-    """Return the rules of robots that connect as clients: egress to their clients is ingress from them."""
+    """Return a router's rules for robots that connect to it: those for clients, with ingress and egress swapped."""
     return [
         {
             **rule,

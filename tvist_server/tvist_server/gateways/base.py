@@ -29,10 +29,10 @@ class GatewayError(TvistError):
 
 
 class CommandIntake:
-    """Receives what arrives at a gateway, from any thread, without blocking; by default ignores what has no answer."""
+    """Takes clients' messages from gateways, in any thread, without blocking; by default ignores unanswered kinds."""
 
     def request(self, data: bytes, answer: Answer) -> None:
-        """Take an encoded command; `answer` is called once, at once if it is rejected, else from another thread."""
+        """Take an encoded command; call `answer` once: immediately for a rejection, else later in another thread."""
         raise NotImplementedError
 
     def info(self, answer: Callable[[Callable[[], bytes]], None]) -> None:
@@ -43,14 +43,14 @@ class CommandIntake:
         raise NotImplementedError
 
     def command(self, command: Command, answer: Answer, origin: str | None = None) -> None:
-        """Take a command of the gateway itself, caused by the machine with the IP address `origin`, if known."""
+        """Take a command that the gateway itself makes for the machine with the IP address `origin` (None: unknown)."""
         raise NotImplementedError
 
     def setpoint(self, data: bytes) -> None:
         """Take an encoded set-point."""
 
     def client_seen(self, client: str, session: str = "") -> None:
-        """Note that a client's liveliness token has appeared; it may name the session that declared it."""
+        """Note that a client's liveliness token has appeared; `session` has declared it, if the token names one."""
 
     def client_gone(self, client: str, session: str = "") -> None:
         """Note that a client's liveliness token, or the session that declared it, has disappeared."""
@@ -64,7 +64,7 @@ class CommandIntake:
 
 
 class Starting(CommandIntake):
-    """Refuses every query to robots that are starting, and reports the progress."""
+    """Intake of robots that are still starting: refuses every query with the progress of the start."""
 
     def __init__(self) -> None:
         self._how_far = ""
@@ -89,7 +89,7 @@ class Gateway:
     """Number of set-points rejected before the intake: on a key with a wildcard, or too large."""
     dropped = 0  # number of states dropped because too many were queued
     wanted_topics: Collection[Topic] = frozenset(get_args(Topic))
-    """Topics that currently have a reader; messages that no gateway takes are not made. Read from any thread."""
+    """Topics with a reader. The robot makes no messages that no gateway wants. Any thread may read this."""
 
     def report(self, report: Report) -> None:
         self.publish("state", report.state, report.encoded)
@@ -98,7 +98,7 @@ class Gateway:
         """Publish a message, given both decoded and encoded. Called from one thread; network errors raise nothing."""
 
     async def open(self) -> None:
-        """Admit clients. Called when the robot ticks."""
+        """Admit clients; called once the robot ticks."""
 
     async def shut(self) -> None:
         """Admit no more clients, and disconnect the present ones."""

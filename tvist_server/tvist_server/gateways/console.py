@@ -19,7 +19,7 @@ LEAVE = 0.2  # longest wait at shutdown for a blocked console [s]
 
 
 class Throttle:
-    """Lets at most `lines` lines per `WINDOW` through and counts the rest; `what` names them in the count's line."""
+    """Passes at most `lines` lines per `WINDOW` and counts the omitted ones; `what` names them in the count."""
 
     def __init__(self, lines: int, what: str) -> None:
         self._lines, self._what = lines, what
@@ -27,7 +27,7 @@ class Throttle:
         self._said = self._left_out = 0
 
     def take(self, line: str, now: float) -> list[str]:
-        """Return the lines to write when a new line comes, at the time `now` of a monotonic clock [s]."""
+        """Take a new line at the time `now` of a monotonic clock [s]; return the lines to write."""
         lines = self.due(now)
         if self._began is None:
             self._began = now
@@ -42,7 +42,7 @@ class Throttle:
         return [] if self._began is None or now - self._began < WINDOW else self.rest()
 
     def rest(self) -> list[str]:
-        """Return that line now, and end the window."""
+        """End the window now, and return the line that counts the omitted lines, if there are any."""
         left_out, self._began = self._left_out, None
         self._said = self._left_out = 0
         return [f"{left_out} more {self._what} in the last {WINDOW:g} s, left out here"] if left_out else []
@@ -72,7 +72,7 @@ class Console:
                 self._put(throttle.due(time.monotonic()))
 
     def close(self) -> None:
-        """Write what remains, unless the console blocks."""
+        """Write the remaining lines; give up after `LEAVE` if the console blocks."""
         with self._lock:
             for throttle in self._throttles.values():
                 self._put(throttle.rest())
@@ -90,7 +90,7 @@ class Console:
 
 
 class ConsoleGateway(Gateway):
-    """Passes the events of the robot `name` to the console; `command_line` builds its commands."""
+    """Passes events of the robot `name` to the console; `command_line` returns a command line for this robot."""
 
     wanted_topics: Collection[Topic] = frozenset[Topic]({"event"})
 

@@ -74,7 +74,7 @@ class Metrics(Collector):
         """URL of the page with the figures."""
 
     def add(self, gateway: MetricsGateway) -> MetricsGateway:
-        """Publish the figures of a robot, too."""
+        """Also publish the figures of this robot."""
         self._robots.append(gateway)
         return gateway
 
@@ -99,7 +99,7 @@ class Metrics(Collector):
 
 
 Figure = tuple[str, str, str, str, Callable[[MetricsGateway], Mapping[str, float]]]
-"""Type, name behind `tvist_`, meaning, name of a further label or "", and numbers of a robot by label."""
+"""Prometheus type, name without `tvist_`, meaning, name of a further label or "", and a robot's values by label."""
 
 
 def _figures() -> Iterator[Figure]:
@@ -115,7 +115,7 @@ def _figures() -> Iterator[Figure]:
 
 
 def _fields(source: str, fields: Mapping[str, str], unit: float, of: MetricsGateway) -> dict[str, float]:
-    """Return a robot's fields of a message that are known, by their keys in `fields`."""
+    """Return known values of a robot's message times `unit`, by the keys that `fields` maps to the message's fields."""
     message = getattr(of, source)
     found = {key: getattr(message, field) for key, field in fields.items() if message is not None}
     return {key: unit * value for key, value in found.items() if value is not None}
@@ -152,7 +152,7 @@ NAMES = {
     "tick": "ticks", "load": "load_ratio", "refused": "commands_refused",
     "dropped_states": "states_dropped",
 }  # fmt: skip
-"""Names of figures that are not those of their fields; each begins with `tvist_`."""
+"""Names, without `tvist_`, of the figures whose names differ from their fields'."""
 QUANTILES = {"0.5": "late_p50_us", "0.99": "late_p99_us", "1": "late_max_us"}
 
 

@@ -17,7 +17,7 @@ from tvist_server.gateways.zenoh import ZenohGateway
 
 CONFIG: Mapping[str, Any] = {
     "mode": "router",
-    # Do not look for other routers: it delays opening by half a second.
+    # Do not look for other routers: this would delay opening by half a second.
     "scouting/delay": 0,
     "scouting/multicast/enabled": False,
     "scouting/gossip/enabled": False,
@@ -26,7 +26,7 @@ CONFIG: Mapping[str, Any] = {
     # By default, a hundred silent connections keep all other clients out for ten seconds.
     "transport/unicast/accept_timeout": 2000,
     "transport/unicast/accept_pending": 1000,
-    # A state costs about 20 µs per subscriber: this many already use several times a tick's 2 ms.
+    # Each subscriber costs about 20 µs per state, so this many need several times the 2 ms of a tick.
     "transport/unicast/max_sessions": 256,
 }
 """Zenoh settings of the session, by path."""
@@ -46,7 +46,7 @@ REALTIME: Mapping[str, Any] = {
 }
 """Additional settings for a clock that does not wait for clients."""
 CONNECT_S = 10
-"""Longest time to reach a router at the start [s]; a router lost later is looked for until the end."""
+"""Longest time to reach a router at the start [s]. If a router is lost later, Zenoh retries without limit."""
 CONNECT: Mapping[str, Any] = {
     "connect/timeout_ms": 1000 * CONNECT_S,
     "connect/exit_on_failure": True,
@@ -91,7 +91,7 @@ class Network:
         truth: bool,
         wanted: Callable[[bool], None] | None = None,
     ) -> ZenohGateway:
-        """Create the gateway of a robot for its intake; in lockstep, the publisher waits so that no state is lost.
+        """Create the gateway of a robot; in lockstep, its publishers wait for clients so that no state is lost.
 
         If `truth` is False, `wanted`, if given, is called from any thread with whether a client subscribes to
         the topic `truth`.
@@ -106,7 +106,7 @@ class Network:
             self._expected[robot] = self._added(robot, starting, complete=here)
 
     def stop_answering_for_workers(self) -> None:
-        """Leave the expected robots to other sessions, because Zenoh does not always prefer a complete answer."""
+        """Stop answering for the expected robots: Zenoh sometimes asks this session although a worker could answer."""
         for gateway in self._expected.values():
             gateway.withdraw()
 
@@ -150,7 +150,7 @@ def _open(endpoints: Sequence[str], settings: Mapping[str, Any]) -> zenoh.Sessio
 def _connected(
     connect: Sequence[str], listen: Sequence[str], settings: Mapping[str, Any], security: str | None
 ) -> zenoh.Session:
-    """Connect to a router as a client, or as a peer with clients of its own; routers keep maps of all other routers."""
+    """Connect to a router as a client, or as a peer if clients connect here; a router would map all other routers."""
     mode = {"mode": "peer", "listen/endpoints": list(listen)} if listen else {"mode": "client"}
     try:
         return _session({**settings, **mode, **CONNECT, **_towards(connect, security)})
@@ -167,7 +167,7 @@ def _connected(
 def open_router(
     listen: Sequence[str], connect: Sequence[str], settings: Mapping[str, Any], security: str | None
 ) -> zenoh.Session:
-    """Open the session of a router, which connects to others when they appear; GatewayError if it cannot listen."""
+    """Open a router's session, which connects to other routers as they appear; GatewayError if it cannot listen."""
     retry = {"connect/retry": CONNECT["connect/retry"]}
     return _open(listen, {**settings, **retry, **_towards(connect, security)})
 

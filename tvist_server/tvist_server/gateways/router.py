@@ -14,8 +14,8 @@ from tvist_server.gateways.security import check_endpoints, router_security
 from tvist_server.option_values import count_of
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
-SESSIONS = 4096  # largest number of robots, clients and routers connected at once
-MAX_COUNT = 10_000  # largest COUNT in `NAME*COUNT`; each robot has its own rules
+SESSIONS = 4096  # largest total number of connected robots, clients and routers
+MAX_COUNT = 10_000  # largest COUNT in `NAME*COUNT`; limited because each robot needs its own rules
 FASTEST = 500.0  # largest rate of states to pass on [1/s], which is the rate at which a robot publishes
 REDUCED = ("state", "truth")  # keys whose rates can be reduced, because each message replaces the one before
 _RATE = re.compile(r"(\d+(?:\.\d+)?)(?:@([\w.:-]+))?")
@@ -53,7 +53,7 @@ def start_router(
     """
     check_endpoints("connect", connect)
     endpoints, guard = router_security(listen, security=security, insecure=insecure)
-    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)  # usually 1024 are set
+    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)  # the limit in force is usually 1024
     resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
     limits = {"downsampling": downsampling(rates, robots)} if rates else {}
     settings = {**REALTIME, "transport/unicast/max_sessions": SESSIONS, **guard, **limits}
@@ -72,8 +72,8 @@ def robots_of(text: str) -> list[RobotPlace]:
 def downsampling(rates: Sequence[Rate], robots: Sequence[RobotPlace]) -> list[dict[str, Any]]:
     """Return Zenoh's `downsampling` settings for what leaves the router.
 
-    Zenoh counts per rule, not per key, and if several rules match a key, it takes any one of them. So
-    there is no rule for all robots beside those of the listed ones, which might then share its rate.
+    A rule limits the total rate of all keys that it matches. If several rules match a key, Zenoh applies any
+    of them. So if robots are listed, there is no rule for all robots: Zenoh might apply it to listed ones.
     """
     listed = {keys.within(place.namespace, f"{keys.PREFIX}/{place.robot}") for place in robots}
     rules = [f"{place}/{leaf}" for place in sorted(listed) or [keys.ANYWHERE] for leaf in REDUCED]

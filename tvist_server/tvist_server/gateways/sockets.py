@@ -35,13 +35,13 @@ MAX_UNSENT: Final = 262_144  # number of unsent bytes above which the peer is di
 
 
 class _Link(asyncio.Protocol):
-    """One socket, used in the network's thread; `tell` passes its news to the controller."""
+    """One socket, used in the network's thread; `tell` reports its events to the controller."""
 
     def __init__(self, number: int, tell: Callable[[SocketNews], None]) -> None:
         self._number, self._tell = number, tell
         self._transport: asyncio.Transport | None = None
         self._received = 0
-        self.taken = 0  # received bytes that the program has read; written in the controller's thread
+        self.taken = 0  # number of bytes that the program has read; written in the controller's thread
         self.paused = False  # whether the sender is paused, because the program has much to read
         self.ended = False  # whether the socket has ended; later events are not reported
         self.connecting: asyncio.Task[None] | None = None  # task that connects it; None before it starts
@@ -75,7 +75,7 @@ class _Link(asyncio.Protocol):
             transport.resume_reading()
 
     def send(self, data: bytes) -> None:
-        """Send bytes; disconnect a peer that leaves too many unread."""
+        """Send bytes; disconnect a peer that leaves too many bytes unread."""
         transport = self._transport
         if transport is None or transport.is_closing():
             return
@@ -85,7 +85,7 @@ class _Link(asyncio.Protocol):
             transport.abort()
 
     def end(self, change: SocketChange | None = None) -> None:
-        """End the socket, and report `change` to the controller unless the controller caused it."""
+        """End the socket, and report `change` to the controller; None: the controller itself ended the socket."""
         if change is not None:
             self._say(change)
         elif self.connecting is not None:
@@ -116,7 +116,7 @@ class ProgramSockets(Gateway, SocketPorts):
         self._links: dict[int, _Link] = {}
         self._waits: dict[int, tuple[int, float]] = {}  # socket and start time of each present wait
         self._moved: set[int] = set()  # sockets with news since the last tick
-        self._silent: set[int] = set()  # sockets that a step has waited for in vain
+        self._silent: set[int] = set()  # sockets for which a step has waited without receiving data
 
     # The following methods run in the controller's thread.
 
@@ -149,7 +149,7 @@ class ProgramSockets(Gateway, SocketPorts):
         return ()
 
     def note(self, news: SocketNews) -> None:
-        """Note that news reach the controller before the next tick."""
+        """Note that the controller gets this news before its next tick."""
         if news.change == "expired":
             if news.number in self._waits:
                 self._moved.add(self._waits[news.number][0])
@@ -158,7 +158,7 @@ class ProgramSockets(Gateway, SocketPorts):
             self._silent.discard(news.number)
 
     def patience(self) -> float:
-        """Return how long a step may wait for a socket that a program reads [s]; once for each silence."""
+        """Return how long a step may wait for sockets that programs read [s]; after a vain wait, 0 until data comes."""
         waits = [(socket, begun) for socket, begun in self._waits.values() if socket not in self._silent]
         if not waits or not self._moved.isdisjoint(socket for socket, _ in waits):
             self._moved.clear()

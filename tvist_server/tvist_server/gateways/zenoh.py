@@ -1,7 +1,7 @@
 """The Zenoh gateway: one robot's keys on the server's session.
 
 Callbacks run in Zenoh's threads (`indirect=False`), so that one client's messages are handled in order: a liveliness
-token before the command that follows it. One may still be running when the session is closed, hence the flag.
+token before the command that follows it. `_closed` is set because a callback may still run while the session closes.
 """
 
 import contextlib
@@ -67,7 +67,7 @@ class ZenohGateway(Gateway):
         session.liveliness().declare_subscriber(
             keys.any_client(robot), Callback(self._on_client, indirect=False), history=True
         )
-        self._queried = intake  # it knows the clients by now
+        self._queried = intake  # from here on, the intake knows the clients
         setpoint = keys.key(robot, "setpoint")
         session.declare_subscriber(setpoint, Callback(partial(self._on_setpoint, setpoint), indirect=False))
         self._publishers = _publishers(session, robot, lockstep=lockstep, truth=truth or wanted is not None)
@@ -103,7 +103,7 @@ class ZenohGateway(Gateway):
     # The following methods run in Zenoh's threads.
 
     def _listen(self, topic: Topic, tell: Callable[[bool], None]) -> None:
-        """Call `tell` with whether a topic has subscribers, now if it has any and at every change."""
+        """Call `tell` with whether a topic has subscribers: now if there are any, then at every change."""
 
         def on_matching(status: zenoh.MatchingStatus) -> None:
             tell(status.matching)
@@ -170,9 +170,9 @@ class ZenohGateway(Gateway):
 
 
 class Answers:
-    """Sends replies to queries from its own thread, because a client that does not read blocks it.
+    """Sends replies to queries from its own thread, because a client that does not read blocks that thread.
 
-    It blocks until its link is closed, after 1 s in real time and 5 s in lockstep: by default, replies use BLOCK.
+    The thread blocks until Zenoh closes the client's link, after 1 s in real time or 5 s in lockstep.
     """
 
     def __init__(self) -> None:

@@ -1,4 +1,4 @@
-"""Reasons why a robot must not be moved or no longer follows, each with the remedy."""
+"""Functions that return why a robot must not be moved, or no longer follows, and the remedy; else None."""
 
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
@@ -59,11 +59,11 @@ FELL_SILENT = Halt(
 
 
 class Expected(NamedTuple):
-    """What tvist was told about the robot."""
+    """Properties of the robot according to tvist's options."""
 
     description: RobotDescription
-    payload: Payload  # payload that the robot should have been told
-    tool: tuple[float, ...] | None = None  # tool centre point that the robot should have been told; None: any
+    payload: Payload  # payload that must be set on the robot
+    tool: tuple[float, ...] | None = None  # tool centre point that must be set on the robot; None: any
     q: tuple[float, ...] | None = None  # joint angles at which the robot should be [rad]; None: any
 
 
@@ -107,7 +107,7 @@ def version_trouble(version: Sequence[int]) -> str | None:
 
 
 def why_not_by_state(expected: Expected, sight: Sight, *, may_play: bool = False) -> str | None:
-    """Return why a robot must not be moved now, None if it may; `may_play`: the program that runs on it is ours."""
+    """Return why a robot must not be moved now, else None. `may_play`: a program on it is tvist's own."""
     mode, safety, runtime = sight.modes
     reasons = (
         (mode == RobotMode.DISCONNECTED, "it is not connected: check the network and the robot"),
@@ -165,7 +165,7 @@ def _load_trouble(expected: Expected, sight: Sight) -> str | None:
 
 
 def mounting_trouble(description: RobotDescription, q: Floats, felt: Floats) -> str | None:
-    """Return why the robot may not be mounted as its file says; None if it is.
+    """Return why the robot's mounting seems to differ from its file; None if it agrees.
 
     `q`: joint angles at rest, shape (6,) [rad]; `felt`: mean specific force in the flange frame, shape (3,) [m/s²].
     """
@@ -197,7 +197,7 @@ def halt_by_modes(modes: tuple[int, int, int]) -> Halt | None:
 
 
 def halt_by_program(ended: int, modes: tuple[int, int, int]) -> Halt | None:
-    """Return why the running program no longer follows; None if it does. `ended` is its register."""
+    """Return why the program no longer follows, else None; `ended` is the content of the register `ENDED`."""
     _, safety, runtime = modes
     if ended in _ENDED:
         return Halt(_ENDED[ended], safety)
@@ -210,7 +210,7 @@ def halt_by_program(ended: int, modes: tuple[int, int, int]) -> Halt | None:
 
 
 def _apart(one: Floats, other: Floats) -> int | None:
-    """Return the joint that differs most, if it differs by more than `MAX_JOINT_DIFFERENCE`."""
+    """Return the index of the joint that differs most; None if it differs by at most `MAX_JOINT_DIFFERENCE`."""
     joint = int(np.argmax(np.abs(one - other)))
     return joint if abs(one[joint] - other[joint]) > MAX_JOINT_DIFFERENCE else None
 

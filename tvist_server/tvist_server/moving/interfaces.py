@@ -20,7 +20,7 @@ _UNKNOWN = "could not understand"
 _PACKAGE, _PART, _DATA = Struct(">iB"), Struct(">IB"), Struct(">53d4i")
 PRIMARY = 30001  # port of the primary interface on a UR robot
 STATE, CONFIGURATION = 16, 6  # type of robot state packages, and number of their part with the configuration
-FAR, TURNED = 5e-3, 0.01  # smallest differences from the robot file that indicate another model [m, rad]
+FAR, TURNED = 5e-3, 0.01  # larger differences from the robot file mean another model [m, rad]
 T = TypeVar("T")
 
 
@@ -29,7 +29,7 @@ class NoAnswerError(Exception):
 
 
 def query(place: RobotAddress, question: bytes, answer: Callable[[bytes], T | None]) -> T:
-    """Return an interface's answer, parsed by `answer` (None: more must come); NoAnswerError after `PATIENCE`."""
+    """Return an interface's answer once `answer` can parse it (None: incomplete); NoAnswerError after `PATIENCE`."""
     heard, ends = b"", time.monotonic() + PATIENCE
     try:
         with socket.create_connection((place.host, place.port), PATIENCE) as connection:
@@ -49,7 +49,7 @@ def query(place: RobotAddress, question: bytes, answer: Callable[[bytes], T | No
 
 
 def query_dashboard(place: RobotAddress, questions: Sequence[str]) -> dict[str, str]:
-    """Return the answers by question, without those that it does not understand; empty if there is no dashboard."""
+    """Return the dashboard's answers to questions that it understands, by question; empty without a dashboard."""
     text = "".join(f"{question}\n" for question in (*questions, "quit")).encode()
 
     def answers(heard: bytes) -> dict[str, str] | None:
@@ -78,7 +78,7 @@ class Configuration(NamedTuple):
     alpha: np.ndarray
 
     def trouble(self) -> str | None:
-        """Return why the limits allow no planning; None if they do."""
+        """Return why motions cannot be planned within these limits; None if they can."""
         for name, found, least, most in (
             ("smallest angles", self.least, -1e3, -0.1),
             ("largest angles", self.most, 0.1, 1e3),
@@ -91,7 +91,7 @@ class Configuration(NamedTuple):
         return None
 
     def is_of(self, description: RobotDescription) -> bool:
-        """Return whether the dimensions are those of a robot file."""
+        """Return whether the dimensions agree with a robot file."""
         file = description.kinematics
         pairs = (self.a, file.a, FAR), (self.d, file.d, FAR), (self.alpha, file.alpha, TURNED)
         return all(np.abs(own - np.array(there)).max() <= apart for own, there, apart in pairs)

@@ -32,23 +32,23 @@ from tvist_server.watching.watched_robot import WatchedRobot
 NUMBERS = 1_000_000_000
 """ProgramRun numbers start with the time in microseconds, so that those of two processes differ."""
 SILENT = 0.08
-"""Time without a row after which the robot counts as silent; its program brakes much earlier [s]."""
+"""Time without an RTDE row after which the robot counts as silent [s]; its program brakes much earlier."""
 MAX_CAUGHT_UP = 50
-"""Largest number of periods made up for after a gap; for a longer one, this machine's clock has counted the time."""
+"""Largest number of periods made up for after a gap in the rows; after a longer gap, they are skipped."""
 
 
 class MovedRobot(RealArm):
-    """Moves one robot; PlantError if that must not be, with the reason and the remedy."""
+    """Moves one robot. If the robot must not be moved, raises PlantError with the reason and the remedy."""
 
     def __init__(
         self,
         place: RobotAddress,
         description: RobotDescription,
-        payload: Payload,  # payload that the robot should have been told
+        payload: Payload,  # payload that must be set on the robot
         *,
         speed_cap: float,  # largest speed of every joint [rad/s]
-        tool: tuple[float, ...] | None = None,  # tool centre point that it should have been told; None: any
-        start: tuple[float, ...] | None = None,  # where it should be [rad]; None: anywhere
+        tool: tuple[float, ...] | None = None,  # tool centre point that must be set on it; None: any
+        start: tuple[float, ...] | None = None,  # joint angles where it must be [rad]; None: any
         lag: ServoLag | None = None,  # lag of its `servoj`, to be compensated; None: unknown
     ) -> None:
         self._robot = WatchedRobot(place, description, payload, OUTPUTS, INPUTS)
@@ -66,7 +66,7 @@ class MovedRobot(RealArm):
             self._refuse_if(mounting_trouble(description, self._sight.measured.q, felt))
         else:
             self._told.append("its accelerometer does not measure gravity: its mounting was not checked")
-        self._expected = self._expected._replace(q=None)  # `start` only matters before the first motion
+        self._expected = self._expected._replace(q=None)  # matters only before the first motion
         if own is None:
             self._told.append("its primary interface reports no limits: only those of the robot file apply")
         if not answers:
@@ -84,14 +84,14 @@ class MovedRobot(RealArm):
 
     @property
     def payload(self) -> Payload:  # type: ignore[override]
-        """Payload that the robot was told."""
+        """Payload that is set on the robot."""
         return self._robot.payload
 
     def described(self) -> RobotDescription:
         return self._expected.description
 
     def measure(self) -> Measurement:
-        """Return the posture that the robot's controller holds, if it may be moved from there."""
+        """Return the posture that the robot's controller holds; PlantError if the robot must not be moved now."""
         run = self._run
         if run is None or not run.ready:
             may_play = run is not None or self._left_paused
@@ -100,7 +100,7 @@ class MovedRobot(RealArm):
         return self._measured(last or self._robot.newest["target_q"])
 
     def step(self, command: DriveCommand) -> Measurement:
-        """Queue a set-point and return the latest measurements; of owed periods, only the last one sends."""
+        """Queue a set-point and return the latest measurements. If periods are made up for, only the last one sends."""
         if self._run is not None:
             self._run.add(command, played=(self._pace.tick - self._sight.tick) % self._interval == 0)
             if not self._pace.owed:
@@ -108,7 +108,7 @@ class MovedRobot(RealArm):
         return self._measured(self._sight.measured.q)
 
     def _measured(self, q: Floats | Sequence[float]) -> Measurement:
-        """Return the latest measurements at a posture, with the time of the present period."""
+        """Return the latest measurements, but with `q` as posture and the time of the present period."""
         felt = self._sight.measured
         return Measurement(
             np.array(q), felt.qd, felt.moment, felt.accelerometer, timestamp=self._pace.tick * PERIOD
@@ -148,7 +148,7 @@ class MovedRobot(RealArm):
                 self._run = ProgramRun(
                     self._robot, self._place, self._number, limits, self._lag, self._trouble
                 )
-            else:  # the conditions at the last check no longer hold
+            else:  # something has changed since the last check
                 self._let_go(Halt(trouble, sight.modes[1]))
         self._left_paused &= sight.modes[2] in {RuntimeState.PAUSING, RuntimeState.PAUSED}
         if self._run is not None:
@@ -166,7 +166,7 @@ class MovedRobot(RealArm):
         return Condition(self._run is not None and self._run.ready, halt=self._halt)
 
     def switch(self, *, power: bool, brakes: bool) -> None:
-        """Start or end our program; people switch power and brakes at the robot."""
+        """Start or end the program. Power and brakes themselves are switched by people at the robot."""
         self.stop()
         self._held = power and not brakes
 
@@ -187,11 +187,11 @@ class MovedRobot(RealArm):
 
 
 class ControlPeriods:
-    """Counts the control periods of one robot: by its rows, or by this machine's clock while it is silent."""
+    """Counts the control periods of one robot: by its RTDE rows, or while it is silent by this machine's clock."""
 
     def __init__(self) -> None:
         self.tick = 0  # number of the present period, in the robot's time
-        self.owed = 0  # number of periods that the last row has started and that are not computed yet
+        self.owed = 0  # number of periods up to the last row that are not computed yet
         self._heard, self._due = -math.inf, 0.0
 
     def silent(self, now: float) -> bool:
@@ -199,11 +199,11 @@ class ControlPeriods:
         return now - self._heard > SILENT
 
     def until(self, now: float) -> float:
-        """Return how long to wait for a row [s], until a local period starts or the robot counts as silent."""
+        """Return how long to wait for a row [s]: until a local period is due or the robot counts as silent."""
         return max(0.0, (self._due if self.silent(now) else self._heard + SILENT) - now)
 
     def row(self, tick: int, now: float) -> bool:
-        """Take a row; return whether it starts a period that the local clock has not already counted."""
+        """Take a row; return whether a period starts, which is false if the local clock has counted it already."""
         self._heard = now
         passed = tick - self.tick
         if passed <= 0:
@@ -213,7 +213,7 @@ class ControlPeriods:
         return self.next(now)
 
     def next(self, now: float) -> bool:
-        """Start the next period if one is owed or a local one is due; return whether it starts."""
+        """If a period is owed, or due by the local clock while the robot is silent, start it and return True."""
         if self.owed:
             self.owed -= 1
         elif self.silent(now) and now >= self._due:

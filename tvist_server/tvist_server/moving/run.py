@@ -30,13 +30,13 @@ from tvist_server.watching.address import RobotAddress
 from tvist_server.watching.watched_robot import WatchedRobot
 
 DECELERATION = 5.0  # smallest deceleration of the fastest joint when the program brakes [rad/s²]
-BRAKES = 0.125  # braking time at the speed cap, if that needs a larger deceleration [s]
+BRAKES = 0.125  # time to brake from the speed cap [s], if this needs more than `DECELERATION`
 SETTLES = 25
-"""Number of rows of the waiting program before the first set-point; rows delayed by its start have come by then."""
-GRACE = 5  # number of rows after the program's end in which the modes may still explain it
-STANDS = 10  # number of rows with the same set-point after which another program must have replaced this one
+"""Number of rows to await from the waiting program before the first set-point: its start delays some rows."""
+GRACE = 5  # number of rows after the program's end in which the modes may still show the reason
+STANDS = 10  # number of rows with the same played set-point after which another program is assumed to run
 HEEDS = 250
-"""Number of ignored set-points after which a waiting program cannot be `follow.script`, which follows the first."""
+"""Number of ignored set-points after which the program is not `follow.script`, which follows the first one."""
 BEGINS = 5.0  # longest time for the program to start [s]
 TELL_EVERY = 10.0  # shortest time between two reports about late set-points [s]
 LOOK_EVERY = 0.2  # longest time until the upload thread notices that it should end [s]
@@ -52,7 +52,7 @@ class ProgramRun:
         number: int,
         limits: ArmLimits,
         lag: ServoLag | None,  # lag of its `servoj`; None: unknown
-        check: Callable[[], str | None],  # why the robot accepts no program now; any thread
+        check: Callable[[], str | None],  # returns why the robot accepts no program now; for any thread
     ) -> None:
         self._robot, self._number, self._window = robot, number, Window()
         self._stands, speed = robot.newest["target_q"], max(limits.velocity)
@@ -63,7 +63,7 @@ class ProgramRun:
         self._follows, self._played, self._still = False, 0, 0
         self.ready = False
         """Whether the program follows `add`. It changes only between two ticks, so that no command is lost."""
-        self.halt: Halt | None = None  # why the program does not follow, and will not again
+        self.halt: Halt | None = None  # why this run has ended or cannot start
         self._told, self._told_at = (0, 0, 0), 0.0
         robot.write(self._window.values(0))  # so that set-points of an earlier run are not played
         deceleration = min(max(DECELERATION, speed / BRAKES), *limits.acceleration)
@@ -76,7 +76,7 @@ class ProgramRun:
         return self._window.newest
 
     def add(self, command: DriveCommand, *, played: bool) -> None:
-        """Take the command of a tick, or the present posture until the program follows; `played`: send a set-point."""
+        """Take a tick's command. If `played`, add its set-point; until the program follows, add the present posture."""
         if self.ready:
             setpoint = self._setpoints.next(command).tolist()
             if played:
@@ -141,7 +141,7 @@ class ProgramRun:
 
 
 class Upload:
-    """Sends a program from its own thread, and stays connected, since some robots end a program without sender."""
+    """Sends a program from its own thread; stays connected, since some robots end a program if its sender leaves."""
 
     def __init__(self, place: RobotAddress, text: str, check: Callable[[], str | None]) -> None:
         self._place, self._text, self._check = place, text, check
@@ -161,7 +161,7 @@ class Upload:
         where = self._place.beside(PRIMARY)
         try:
             with socket.create_connection((where.host, where.port), PATIENCE) as connection:
-                self.trouble = self._check()  # a late program would end another program's motion
+                self.trouble = self._check()  # an upload would end a program that has started meanwhile
                 if self.trouble is not None or self._closed.is_set():
                     return
                 connection.sendall(self._text.encode())

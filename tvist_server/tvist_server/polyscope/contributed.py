@@ -29,13 +29,13 @@ def kind_of(node: Element) -> str:
 
 
 def lines_of(node: Element) -> list[str] | None:
-    """Return the lines of a node without children; None if it cannot be translated."""
+    """Return a node's lines of URScript, without those of its children; None if the node cannot be translated."""
     kind = node.get("strategyClass") or ""
     return _move_fingers(node) if kind == f"{_GRIPPER}GripperNode" else _LINES.get(kind)
 
 
 def branch_of(node: Element) -> str | None:
-    """Return the head of the branch that a node of Robotiq's Grip Check is; empty for the node around its branches."""
+    """Return the first line of a branch of Robotiq's Grip Check; "" for the whole check, None for other nodes."""
     return _BRANCHES.get(node.get("strategyClass") or "")
 
 
@@ -46,7 +46,7 @@ def detection(node: Element) -> str:
 
 
 def _move_fingers(node: Element) -> list[str]:
-    """Return the lines that move the fingers: percentages are counts up to 255, rounded half up."""
+    """Return the lines that move the fingers; 100 % become 255 counts, and halves are rounded up."""
     position, speed, force = (
         int(numbers(_datum(node, f"{name}InDouble", ""), 1)[0] * 255.0 / 100.0 + 0.5)
         for name in ("position", "speed", "force")

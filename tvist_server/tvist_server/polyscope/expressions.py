@@ -1,4 +1,4 @@
-"""Expressions of a program saved by PolyScope, and the names in them, as URScript."""
+"""Translates expressions of a program saved by PolyScope, and the names in them, to URScript."""
 
 import re
 from xml.etree.ElementTree import Element
@@ -34,7 +34,7 @@ class UnknownPartError(Exception):
 
 
 def script_name(text: str) -> str:
-    """Return a name as PolyScope writes it in scripts: letters beyond ASCII become their numbers."""
+    """Return a name as PolyScope writes it in scripts: letters beyond ASCII become `u` and their code points."""
     plain = "".join(c if re.match(r"\w", c, re.ASCII) else f"u{ord(c)}" if c.isalpha() else "_" for c in text)
     return plain if plain[:1].isalpha() or plain[:1] == "_" else f"_{plain}"
 

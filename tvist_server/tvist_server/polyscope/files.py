@@ -1,4 +1,4 @@
-"""Program files: URScript, or what PolyScope saves, with the installation and the variables beside it."""
+"""Reads program files: URScript, or those saved by PolyScope with installation and variables files beside them."""
 
 import zlib
 from functools import lru_cache

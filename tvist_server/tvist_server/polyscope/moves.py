@@ -20,7 +20,7 @@ _AXES = {
     for axis in "XYZ"
     for name, sign in (("Plus", "+"), ("Minus", "-"))
 }
-_BRAKING = "1.2"  # deceleration after a contact that has none [m/s^2]
+_BRAKING = "1.2"  # deceleration after a contact for which the program gives none [m/s^2]
 _FAR = 1000.0  # length of a motion that only a contact or a signal ends [m]
 TOWARDS = """def point_towards(feature, direction, distance):
   local axis = [direction[0], direction[1], direction[2]]
@@ -31,7 +31,7 @@ TOWARDS = """def point_towards(feature, direction, distance):
   local ahead = pose_trans(feature, p[axis[0] * distance, axis[1] * distance, axis[2] * distance, 0, 0, 0])
   return pose_add(get_target_waypoint(), pose_sub(ahead, feature))
 end"""
-"""Function that directions call: a pose ahead of the last waypoint along an axis of a feature."""
+"""URScript function that motions in a direction call: a pose along an axis of a feature from the last target."""
 
 
 @dataclass(frozen=True)
@@ -41,12 +41,12 @@ class _Style:
     kind: str
     speed: str
     acceleration: str
-    blend: float  # of MoveP [m]
+    blend: float  # blend radius of MoveP [m]
     joints: bool  # whether its waypoints are postures, not poses
-    tcp: str  # set before each motion; empty for the active TCP
+    tcp: str  # TCP to set before each motion; empty: the active TCP
     flange: bool  # whether waypoints are poses of the flange
     feature: Element | None
-    ends: bool  # whether no MoveP continues it, so that its last waypoint has no blend
+    ends: bool  # whether the next node is no MoveP, so that the last waypoint has no blend
 
 
 class Moves:
@@ -58,8 +58,8 @@ class Moves:
         expressions: Expressions,
         references: References,
         installation: Installation,
-        following: dict[Element | None, Element | None],  # the node behind each node
-        children: Callable[[Element], None],  # translates the nodes inside one
+        following: dict[Element | None, Element | None],  # next node of each node
+        children: Callable[[Element], None],  # translates the nodes inside a node
     ) -> None:
         self._text, self._expressions, self._references = text, expressions, references
         self._installation, self._following, self._children = installation, following, children
@@ -132,7 +132,7 @@ class Moves:
         return node.get("name") or "Waypoint"
 
     def _place(self, node: Element) -> tuple[str, str]:
-        """Return where a waypoint is: a pose or posture, and a posture near it if it was taught."""
+        """Return a waypoint's pose or posture in URScript, and if it was taught a posture near the pose, else ""."""
         name = script_name(self._name(node))
         position = self._references.target(node.find("position"))
         try:
@@ -176,7 +176,7 @@ class Moves:
     # ------------------------------------------------------------------ directions
 
     def direction(self, node: Element) -> None:
-        """Translate a motion in a direction: a thread moves until one of the Until nodes ends it."""
+        """Translate a motion in a direction: a thread moves the arm until the condition of an Until node ends it."""
         style, text, number = self._style, self._text, self._text.numbers[node]
         feature = node.find("feature")
         shown, frame = self.feature(style.feature if feature is None else feature)
@@ -259,7 +259,7 @@ class Moves:
         self._text.line(f"movel(touched, a={acceleration}, v=0.1)")
 
     def input_is(self, node: Element) -> str:
-        """Return the condition that a digital input has a node's value."""
+        """Return the condition that a digital input has the value given in a node."""
         wanted = node.get("digitalValue") or node.findtext("digitalValue") or ""
         if wanted not in {"0", "1", "true", "false"}:
             raise UnknownPartError("an analog input as a condition")

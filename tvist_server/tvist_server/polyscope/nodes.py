@@ -12,7 +12,7 @@ from tvist_server.polyscope.moves import DIRECTION, Moves
 from tvist_server.polyscope.references import References
 from tvist_server.polyscope.script_text import ScriptText
 
-_OTHERS = "2147483647"  # value of the case for all others
+_OTHERS = "2147483647"  # case value of a Switch's default case
 _POPUPS = {"Message": "False, False", "Warning": "True, False", "Error": "False, True"}
 
 
@@ -43,9 +43,9 @@ class Nodes:
     ) -> None:
         self.text, self.missing = ScriptText(numbers_of), list[str]()
         self._references, self._skip = references, skip
-        self._following: dict[Element | None, Element | None] = {}  # the node behind each node
+        self._following: dict[Element | None, Element | None] = {}  # next node of each node
         self.expressions = Expressions(references, installation)
-        self._switches, self._grip = 0, ""  # number of Switch nodes; condition of the present Grip Check
+        self._switches, self._grip = 0, ""  # Switch nodes so far; condition of the present Grip Check
         self.moves = moves = Moves(
             self.text, self.expressions, references, installation, self._following, self.children
         )
@@ -72,7 +72,7 @@ class Nodes:
                 self.missing.append(f"{one.tag} with {error}")
 
     def _branch(self, node: Element, head: str, title: str, *, more: bool) -> None:
-        """Translate a branch; `more` follow it. The label of an `if` stands before it, those of others inside."""
+        """Translate a branch; `more`: others follow. The label is before an `if`, but inside `elif` and `else`."""
         first = head.startswith("if ")
         if first:
             self.text.label(node, title)

@@ -1,4 +1,4 @@
-"""Waypoints taught on a robot: joint angles, and the pose of the TCP by that robot's calibrated kinematics."""
+"""Waypoints taught on a robot: joint angles, and the TCP's pose, computed with that robot's calibration."""
 
 from math import cos, sin
 from xml.etree.ElementTree import Element

@@ -1,4 +1,4 @@
-"""Programs saved by PolyScope as URScript, with PolyScope's labels."""
+"""Translates programs saved by PolyScope to URScript, with PolyScope's labels."""
 
 from collections.abc import Callable
 from contextlib import nullcontext
@@ -75,7 +75,7 @@ def script_of(
 
 
 def _repeated(nodes: Nodes, part: Element, *, again: bool, label: str = "") -> None:
-    """Translate a main program, which has a label, or a thread; `again` repeats it."""
+    """Translate a main program (it has a label) or a thread; `again`: inside an endless loop."""
     with nodes.text.block("while (True):") if again else nullcontext():
         if label:
             nodes.text.label(part, label)
@@ -103,7 +103,7 @@ def _functions(root: Element, references: References) -> dict[str, Element]:
 
 
 def _acts(main: Element) -> bool:
-    """Return whether a program does more than define functions: repeating that would compute for ever."""
+    """Return whether a program does more than define functions; if not, a loop around it would never wait."""
     return any(
         node.tag not in {"Comment", "MainProgram", "Folder", "SuppressedNode"}
         and not (node.tag == "Script" and _only_defines(node.findtext("cachedContents") or ""))
@@ -130,7 +130,7 @@ def program_text(name: str, body: str) -> str:
 
 
 def with_external_control(text: str, sent: str) -> str:
-    """Replace the External Control nodes by a client's text; its header goes first, as functions cannot be in loops."""
+    """Replace External Control nodes by a client's text; its functions go first, since they cannot be in loops."""
     header, mark, part = sent.partition(_HEADER_ENDS)
     if not mark:
         header, part = "", sent

@@ -1,4 +1,4 @@
-"""The text of a script while it is written: indented blocks, and labels with the numbers of PolyScope's nodes."""
+"""Writes the text of a script: indented blocks, and labels with the numbers of PolyScope's nodes."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -15,18 +15,18 @@ class ScriptText:
         self._depth = 0
 
     def line(self, *lines: str) -> None:
-        """Add lines at the present indentation; one with line breaks is several."""
+        """Add lines at the present indentation; texts with line breaks become several lines."""
         indent = "  " * self._depth
         self._lines += [indent + part for line in lines for part in line.split("\n")]
 
     def label(self, node: Element, title: str, *lines: str) -> None:
-        """Add the label of a node, and lines behind it."""
+        """Add the label of a node, then lines."""
         plain = "".join(c for c in title.replace('"', "'") if c.isprintable())
         self.line(f'$ {self.numbers[node]} "{plain}"', *lines)
 
     @contextmanager
     def block(self, head: str, end: str = "end") -> Iterator[None]:
-        """Add a block; an empty `end` leaves it to a following branch."""
+        """Add a block of the lines added within the context; if `end` is empty, a following branch ends the block."""
         self.line(head)
         self._depth += 1
         yield

@@ -38,7 +38,7 @@ class BlackBox(Sink):
         self._said = set[str]()
 
     def report(self, report: Report) -> None:
-        """Keep a tick; the first one after a failure is the last one in its file."""
+        """Keep a tick; after a failure, write the file, in which this tick is the last one."""
         kept = self._kept
         kept.append(copy(report))  # the state that others build in the original would double the size
         while kept[0].tick < report.tick - KEPT:
@@ -52,7 +52,7 @@ class BlackBox(Sink):
         self._failed |= event.code == "plant_failure"
 
     def raised(self, error: Exception) -> None:
-        """Log an exception with its traceback, but each kind only once."""
+        """Log an exception with its traceback; log equal exceptions only once."""
         said = named(error)
         if said not in self._said and len(self._said) < MAX_FILES:
             self._said.add(said)

@@ -27,7 +27,7 @@ from tvist_server.recording.writer import heading
 log = logging.getLogger(__name__)
 
 QUEUE_SIZE = 8192
-"""Number of messages that may wait: 30 MB, five seconds at 1500 messages/s, as a file system's commit may take."""
+"""Number of messages that may wait: 30 MB or five seconds, for which a file system's commit may block writing."""
 PAUSE = 0.02
 """Time between two checks of the queue [s]; waking the writer would cost a system call and the interpreter's lock."""
 CHECK_EVERY = 1.0  # time between two checks whether the file was moved or deleted [s]
@@ -36,8 +36,8 @@ CHECK_EVERY = 1.0  # time between two checks whether the file was moved or delet
 class Recorder(Sink):
     """Records one robot until it is closed; RecorderError if the recording cannot start.
 
-    Messages come from one thread; they are not copied and must not change afterwards. Without `wait`, only
-    `close` blocks. No other method raises: if the queue is full or the recording has stopped, messages are
+    Messages come from one thread; they are not copied and must not change afterwards. Without `wait`, taking
+    a message never blocks, and it never raises: if the queue is full or the recording has stopped, messages are
     dropped and counted.
     """
 
@@ -45,11 +45,11 @@ class Recorder(Sink):
         self,
         path: str | os.PathLike[str],  # with `keep`, segments are named after it
         info: Info,
-        start: Mapping[str, Any],  # all that a replay needs besides the journal, as JSON types
+        start: Mapping[str, Any],  # what a replay needs besides the journal, as types of JSON
         *,
         keep: int | None = None,  # least number of ticks kept, in segments; None: all
         wait: bool = False,  # whether to wait when the queue is full (lockstep and free)
-        on_error: Callable[[str], None] | None = None,  # called once in the writer's thread if it stops
+        on_error: Callable[[str], None] | None = None,  # called once in the writer's thread if that stops
         on_moved: Callable[[str], None] | None = None,  # called once when the file was moved
     ) -> None:
         self.path = Path(path)
@@ -151,7 +151,7 @@ class Recorder(Sink):
             self._stop(f"the recording {self.path} has stopped and is incomplete: {_reason(error)}")
 
     def _check_file(self) -> None:
-        """Report once that the file was moved; DeletedError if it was deleted, because its data is lost anyway."""
+        """If the file was moved, report that once; if it was deleted, raise DeletedError, because its data is lost."""
         there, expected = self._file.where(), self._file.path
         self.place = self._file.whole if there == expected else there
         if there != expected and self._on_moved is not None:
@@ -160,7 +160,7 @@ class Recorder(Sink):
             self._on_moved = None
 
     def _drain(self) -> None:
-        """Write the messages that wait now, not later ones, so that the file is checked regularly."""
+        """Write the messages that wait now; later ones must wait, so that the file is checked regularly."""
         for _ in range(len(self._queue)):
             message = self._queue.popleft()
             self._file.write(message.state if isinstance(message, Report) else message)

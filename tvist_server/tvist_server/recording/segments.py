@@ -27,7 +27,7 @@ KEPT_RUNS = 5  # number of earlier runs whose recordings are kept
 
 
 class DeletedError(Exception):
-    """The file has been deleted: its data disappears when it is closed."""
+    """The file has been deleted; its data will be lost when it is closed."""
 
 
 class Segments:
@@ -81,7 +81,7 @@ class Segments:
         self._counted = now
 
     def where(self) -> Path | None:
-        """Return the growing file's path, which may have moved; None if unknown, DeletedError if it has none."""
+        """Return the growing file's present path; None: unknown after a move. DeletedError if the file was deleted."""
         here = os.fstat(self._stream.fileno())
         if here.st_nlink == 0:
             raise DeletedError
@@ -95,7 +95,7 @@ class Segments:
         try:
             there = Path(f"/proc/self/fd/{self._stream.fileno()}").readlink()
             return there if os.path.samestat(there.stat(), here) else None
-        except OSError:  # if the file has several names, the system may report a deleted one
+        except OSError:  # the system may report a deleted name of a file with several names
             return None
 
     def close(self) -> None:
@@ -114,7 +114,7 @@ class Segments:
             raise
 
     def _turn(self, tick: int, keep: int) -> None:
-        """Complete the segment, start the next one with this tick, and delete those that are no longer needed."""
+        """Complete the segment, start the next one with this tick, and delete segments that are no longer needed."""
         self.finish()
         self._stream.close()
         self._number += 1
@@ -129,7 +129,7 @@ class Segments:
 
 
 def _new_run(path: Path) -> int:
-    """Return the number of a new run; delete the oldest runs and empty ones, which do not count, unless in use."""
+    """Return a new run's number; delete the oldest runs and empty ones, unless in use. Empty runs do not count."""
     runs: dict[int, list[Path]] = {}
     for place in path.parent.iterdir():
         found = segment_of(place.name)

@@ -1,6 +1,6 @@
-"""The client's end of an RTDE connection, without socket: bytes in, bytes and rows out.
+"""The client's side of an RTDE connection without its socket: takes bytes, returns bytes to send and rows.
 
-It negotiates version 2, sets up outputs, claims inputs if any, and starts. Without inputs it can send no command.
+It negotiates version 2, subscribes to outputs, claims inputs if any, and starts. Without inputs it only reads.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,7 +13,7 @@ from tvist_server.rtde.codec import PackageKind, PackageReader, package, words
 from tvist_server.rtde.wire import Field, WireType
 
 Row = Mapping[str, tuple[float, ...]]
-"""Values of one cycle of the robot by name, each within its range; a number is a tuple of one."""
+"""Values of one cycle of the robot by name, each within its range; a single number is a tuple of length 1."""
 PROTOCOL = 2  # protocol version, in which the client chooses the frequency
 RATE = 500.0  # requested frequency; a robot with a slower cycle sends at its own [Hz]
 _VERSION = Struct(">4I")
@@ -24,7 +24,7 @@ class RtdeError(ValueError):
 
 
 class Received(NamedTuple):
-    """Result of bytes from the robot."""
+    """Content of the bytes that have come from the robot, and the bytes to answer."""
 
     send: bytes
     rows: Sequence[Row]  # complete rows, in order
@@ -37,7 +37,7 @@ class RtdeClient:
     def __init__(
         self,
         needed: Mapping[str, Field],  # types and ranges of the required variables
-        optional: Mapping[str, Field],  # those of variables that some robots, and so their rows, lack
+        optional: Mapping[str, Field],  # the same of variables that may be missing in rows of some robots
         inputs: Mapping[str, WireType] = MappingProxyType({}),  # types of the inputs to claim; no vectors
     ) -> None:
         self._needed, self._types = needed, {**needed, **optional}
@@ -53,7 +53,7 @@ class RtdeClient:
 
     @property
     def lacking(self) -> list[str]:
-        """Names that the robot does not know."""
+        """Names of requested variables that the robot does not know."""
         return [name for name in self._types if name not in self._names]
 
     def begin(self) -> bytes:
@@ -140,7 +140,7 @@ class RtdeClient:
 
     def _rows(self, payload: bytes) -> Sequence[Row]:
         if self._row is None or payload[:1] != bytes([self._recipe]):
-            return ()  # of a replaced recipe
+            return ()  # a row of a replaced recipe
         if len(payload) != 1 + self._row.size:
             raise RtdeError(f"a row has {len(payload) - 1} bytes instead of {self._row.size}")
         numbers, row, at = self._row.unpack_from(payload, 1), dict[str, tuple[float, ...]](), 0

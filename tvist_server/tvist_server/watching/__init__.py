@@ -1,1 +1,1 @@
-"""A real UR robot that is only watched: its RTDE rows give the ticks, and it is only sent queries."""
+"""A real UR robot that is only watched: each of its RTDE rows starts a tick, and tvist sends it only queries."""

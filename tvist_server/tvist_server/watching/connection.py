@@ -16,7 +16,7 @@ ANSWERS = 3.0  # longest time for a robot to accept a connection and start sendi
 SILENT = 1.0  # time without a new row after which a connection is lost [s], as in UR's own clients
 Address = tuple[socket.AddressFamily, tuple[Any, ...]]
 """Family of an address, and the address as `socket` has it."""
-AT_ONCE = 1 << 16  # largest number of bytes read at once: two seconds of rows
+AT_ONCE = 1 << 16  # largest number of bytes per read: two seconds of rows
 
 
 class LostError(Exception):
@@ -28,7 +28,7 @@ class UnreachableError(LostError):
 
 
 class RtdeConnection:
-    """One connection to the robot at `place`, whose `address` comes from `resolve`; `client` reads and writes."""
+    """One connection to the robot at `place`. `address` is the result of `resolve`; `client` encodes and decodes."""
 
     def __init__(self, place: RobotAddress, address: Address, client: RtdeClient) -> None:
         self._place, self.client = place, client
@@ -43,7 +43,7 @@ class RtdeConnection:
         self._selector.register(self._socket, selectors.EVENT_WRITE)
 
     def rows(self, timeout: float) -> Sequence[Row]:
-        """Return the rows that have come, waiting at most `timeout` [s]; LostError without a robot."""
+        """Wait at most `timeout` [s] for rows and return them; LostError if the connection is lost."""
         try:
             ready = self._selector.select(max(0.0, timeout)) or self._selector.select(0.0)
             if ready and not self._connected:
@@ -59,7 +59,7 @@ class RtdeConnection:
         return rows
 
     def write(self, numbers: Sequence[float]) -> None:
-        """Write all inputs, without waiting; packages that the link does not take at once are dropped."""
+        """Write all inputs without blocking; if the link does not take the package at once, drop it."""
         if not self.client.started:
             return
         self._rest = self._rest[self._give(self._rest) :]

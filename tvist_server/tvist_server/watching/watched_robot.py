@@ -1,4 +1,4 @@
-"""A real robot as a plant that gives the ticks but takes no command; a lost connection is retried every second."""
+"""A real robot as a plant that starts ticks but takes no command; a lost connection is retried every second."""
 
 import time
 from collections import deque
@@ -23,21 +23,21 @@ from tvist_server.watching.variables import JOINTS, NEEDED, OPTIONAL, RowCount, 
 
 FIRST_ROWS = 25  # number of rows that determine the row rate
 INTERVALS = {1: "500", 4: "125"}  # control periods between two rows, and the row rate of such a robot [Hz]
-TEXTS = 10  # largest number of the robot's texts passed on in a second, and queued for its next row
+TEXTS = 10  # largest number of the robot's messages passed on per second, and queued for its next row
 RETRY = 1.0  # time between two attempts to connect [s]
 TELL_EVERY = 1.0  # shortest time between two reports about missing rows [s]
 OTHER = 0.03
-"""Smallest distance of the tool that indicates another model [m]; a calibration shifts it by some millimetres."""
+"""Deviation of the tool's position that means another model [m]; calibrations shift it by some millimetres."""
 
 
 class WatchedRobot(RealArm):
-    """Reads one robot, and writes the inputs that are claimed; PlantError if it cannot be watched."""
+    """Reads one robot's RTDE rows and writes the claimed inputs; PlantError if the robot cannot be watched."""
 
     def __init__(
         self,
         place: RobotAddress,
         description: RobotDescription,
-        payload: Payload,  # if the robot does not report one
+        payload: Payload,  # used if the robot does not report one
         outputs: Mapping[str, Field] = MappingProxyType({}),  # types and ranges of further required variables
         inputs: Mapping[str, WireType] = MappingProxyType({}),  # types of the inputs to claim
     ) -> None:
@@ -177,7 +177,7 @@ class WatchedRobot(RealArm):
         return rows
 
     def _check(self, row: Row) -> None:
-        """Raise LostError if the tool is not where the robot file has it; without a tool in the row, only note that."""
+        """Raise LostError if the tool's pose contradicts the robot file; if the row lacks the pose, only note that."""
         if "tcp_offset" not in row:
             self._notes.append(
                 f"whether it is a {self._model} is unknown, because it does not report its tool"
@@ -225,7 +225,7 @@ class WatchedRobot(RealArm):
         return sight
 
     def _lose(self, error: LostError | RtdeError) -> None:
-        """Close the connection and report the loss in a tick of its own, once per reason, not for failed retries."""
+        """Close the connection; report a loss once per reason in an extra tick, and do not report failed retries."""
         self.close()
         now, why = time.monotonic(), str(error)
         self._retry_at = now + RETRY

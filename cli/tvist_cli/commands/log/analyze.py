@@ -22,7 +22,7 @@ COMPARED = (
     ("residual_vibration_m_s2", 2, "residual_vibration"), ("peak_m_s2", 2, "peak"),
     ("still_after_ms", 0, "still_after"), ("f_d_hz", 2, ""),
 )  # fmt: skip
-"""For each figure of the comparison: its field, its decimals, and the field of its change."""
+"""Fields of the comparison: name, number of decimals, and name of the field with the change."""
 
 
 def analyze(
@@ -124,7 +124,7 @@ def _motions(
 
 
 def _sensor_alone(recording: "Recording", *, json: bool) -> dict[str, Any]:
-    """Measure frequency and damping in a log without joint angles; see `_motions`."""
+    """Measure frequency and damping in a log without joint angles; return or print them as `_motions` does."""
     from tvist_lab.metrics.columns import number as cell
     from tvist_lab.metrics.sensor_alone import free_vibrations
 

@@ -74,6 +74,6 @@ def record(
         say(f"{states} states recorded, {lost} lost")
     if ending.signal == SIGINT:
         said = f"{states * 0.002:.1f} s recorded into {file}"
-        if seconds is not None:  # without it, Control+C is how a recording ends
+        if seconds is not None:  # without `seconds`, Control+C ends the recording regularly
             raise interrupted(said)
         say(f"interrupted: {said}")

@@ -28,9 +28,9 @@ class PortSession(ABC):
     _send: Send
     over = False  # whether the connection is closed, or the client has asked to close it
     client_begins = False
-    """Whether the client gets nothing that it has not requested, so that it may be disconnected to make room."""
+    """Whether the client only gets what it requests. Unless `served`, it may be disconnected to make room."""
     served = False
-    """Whether the client is being sent what it requested; it may then be silent, but has to read."""
+    """Whether the client is receiving data that it subscribed to: it may then be silent, but must read."""
     most_waiting = MAX_COMMANDS
     """Number of waiting requests at which reading pauses."""
 
@@ -44,24 +44,24 @@ class PortSession(ABC):
 
     @abstractmethod
     def receive(self, data: bytes) -> None:
-        """Take received data, which may be split anywhere."""
+        """Handle received bytes, which may begin and end anywhere in a request."""
 
     def sample(self, snapshot: Snapshot) -> bytes:  # noqa: ARG002  many sessions send nothing
-        """Return this tick's data for the client, or nothing. It is dropped if the client is slow."""
+        """Return this tick's data for the client, if any. If the client is slow, the data is dropped."""
         return b""
 
     def event(self, event: Event) -> None:  # noqa: B027  not every session has to
         """Handle an event of the robot."""
 
     def closed(self) -> None:
-        """Release what the connection held, after it was closed."""
+        """Release control after the connection was closed."""
         self.over = True
         self._control.leave()
 
 
 @dataclass(eq=False)
 class InTurnSession(PortSession, Generic[Item]):
-    """Handles a client's requests one at a time; it finishes them, with control, even if the client disconnects."""
+    """Handles requests one at a time. If the client disconnects, control is released after its last request."""
 
     _items: deque[Item] = field(default_factory=deque, init=False)
     _busy: bool = field(default=False, init=False)
@@ -75,7 +75,7 @@ class InTurnSession(PortSession, Generic[Item]):
         """Handle one item."""
 
     def _add(self, item: Item, *, stop: bool = False) -> None:
-        """Queue an item; if it stops the arm and has to wait, stop the arm at once as well."""
+        """Queue an item. If it is a `stop` and has to wait, also stop the arm at once."""
         if stop and self._busy:
             begin(self._robot.programs.stop(self._control))
         self._items.append(item)

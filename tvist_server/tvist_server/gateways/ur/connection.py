@@ -48,11 +48,11 @@ REASONS = {
 
 
 class ClientConnection(asyncio.BufferedProtocol):
-    """One client at one interface; if it is lossless (lockstep), samples wait for a slow client."""
+    """One client's connection to one interface; if it is `lossless` (lockstep), samples wait for a slow client."""
 
     def __init__(
         self,
-        make: Callable[[ConnectionControl, Send], PortSession],  # makes the session
+        make: Callable[[ConnectionControl, Send], PortSession],  # creates the client's session
         lease: Callable[[str], HostLease],
         limit: "ConnectionLimit",
         *,
@@ -66,8 +66,8 @@ class ClientConnection(asyncio.BufferedProtocol):
         self._transport: asyncio.Transport
         self._piece = bytearray(PIECE)
         self._admitted = False  # whether the client has got a place
-        self._behind = False  # whether the client has left many answers unread
-        self._took = 0.0  # when the socket last accepted a sample [s of the loop's clock]
+        self._behind = False  # whether the client has more than `ANSWERS` bytes unread
+        self._took = 0.0  # time of the last sample that the socket accepted [s, loop's clock]
         self.session: PortSession  # of a client that has a place
         self.peer = "a client"  # description of the client and its interface, for messages
         self.heard = 0.0  # when the client last sent something, or connected [s of the loop's clock]
@@ -205,10 +205,10 @@ class ClientConnection(asyncio.BufferedProtocol):
 
 
 class ConnectionLimit:
-    """Decides which clients may connect, so that a flood of new ones does not disturb those at work.
+    """Decides which clients may connect, so that a flood of new clients does not disturb those that are working.
 
     When 90 % of the places are taken, each new client displaces the dispensable one that has been silent for
-    longest: a dashboard client, or an RTDE client outside the time from its start to its pause.
+    longest: a dashboard client, or an RTDE client that has not started or has paused its outputs.
     """
 
     def __init__(self, now: Callable[[], float], note: Callable[[str], None]) -> None:
@@ -242,7 +242,7 @@ class ConnectionLimit:
 
 
 def _left_in(transport: asyncio.Transport) -> bytes:
-    """Return unread data of a connection that its client has reset, as after sending a script with states unread."""
+    """Return the received data of a reset connection: a client may send a script and close with states unread."""
     left = bytearray()
     with (
         socket.socket(fileno=os.dup(transport.get_extra_info("socket").fileno())) as stream,

@@ -53,7 +53,7 @@ class Command(NamedTuple):
 
 
 def _changing(change: Change, done: str, too_soon: str | None = None) -> Handler:
-    """Return a handler that makes a change and answers `done`, or `too_soon` if the mode forbids the change."""
+    """Return a handler that makes a change and answers `done`; `too_soon` is its answer if the mode forbids that."""
 
     async def carry_out(request: Request) -> str | None:
         refused = await change(request.robot, request.control)
@@ -200,7 +200,7 @@ COMMANDS: Final = (
     Command("shutdown", _changing(power.power_off, "Shutting down")),
     Command(QUIT, _say("Disconnected")),
 )
-"""All commands; a longer keyword precedes one that it starts with."""
+"""All commands; if one keyword starts with another one, the longer keyword comes first."""
 
 
 def find(line: str) -> tuple[Command, str] | None:
@@ -220,10 +220,10 @@ class DashboardSession(InTurnSession[str]):
     """One client of the dashboard. Answers keep their order, but a `stop` takes effect when it is read."""
 
     client_begins = True
-    most_waiting = 256  # lines, so that a `stop` behind fewer is read; at most 1 MB a client
+    most_waiting = 256  # lines: a `stop` after fewer lines is read at once; at most 1 MB a client
     _lines: LineSplitter = field(default_factory=partial(LineSplitter, LONGEST), init=False)
     _rests: Deferred[bool] | None = field(default=None, init=False)  # waits for the arm to rest
-    _last: int = field(default=0, init=False)  # tick at which this wait ends
+    _last: int = field(default=0, init=False)  # last tick of the wait for the arm
 
     def opened(self) -> None:
         self._say(GREETING)

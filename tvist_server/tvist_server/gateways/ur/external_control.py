@@ -16,18 +16,18 @@ ALONE: Final = program_text("external_control", EXTERNAL_CONTROL)
 
 
 class ExternalControl:
-    """Completes such programs."""
+    """Inserts clients' parts into programs with an External Control node."""
 
     def __init__(
         self,
         folder: ProgramFolder,  # programs that clients load by name
-        fetch: Callable[[str], Awaitable[str | None]],  # gets a machine's part; None: no answer
-        aside: Callable[[Callable[[], str | None]], Awaitable[str | None]],  # reads in another thread
+        fetch: Callable[[str], Awaitable[str | None]],  # requests a machine's part; None: no answer
+        aside: Callable[[Callable[[], str | None]], Awaitable[str | None]],  # runs in another thread
     ) -> None:
         self._folder, self._fetch, self._aside = folder, fetch, aside
 
     async def find(self, name: str) -> str | None:
-        """Return the text of a program that must be completed; None if there is none of this name."""
+        """Return the text of program `name` if it has an External Control node, else None."""
         return await self._aside(partial(self._text, name))
 
     def _text(self, name: str) -> str | None:
@@ -39,7 +39,7 @@ class ExternalControl:
         return text if text is not None and EXTERNAL_CONTROL in text else None
 
     async def complete(self, text: str, host: str) -> str | None:
-        """Insert the part of the machine `host`; None if it does not answer or the text becomes too long."""
+        """Return `text` with the part of the machine `host`; None if there is no answer or the text gets too long."""
         sent = await self._fetch(host)
         whole = None if sent is None else with_external_control(text, sent)
         return None if whole is None or len(whole) > MAX_SCRIPT else whole

@@ -41,11 +41,11 @@ log = logging.getLogger(__name__)
 FIRST = 1000  # longest wait for the first tick [ticks]
 MAX_PENDING = 250  # largest number of states queued for the interfaces' thread: half a second
 LEAD = 20
-"""Largest queue in lockstep: the further a step runs ahead of published states, the later clients get answers."""
-MOST_LINES = 10  # largest number of lines of each kind on the console, in each of its windows
+"""Largest number of queued states in lockstep; a longer queue would delay answers, which come after its states."""
+MOST_LINES = 10  # largest number of lines of each kind on the console per `WINDOW`
 PAUSE = 0.02  # time between two checks for room in lockstep [s]
 UNREAD = 10
-"""States handed over together while there is no client; only temperatures and energies need them then."""
+"""Number of states handed over together while no client is connected; only temperatures and energies use them."""
 _SESSIONS: Mapping[InterfaceName, Callable[[UrRobot, ConnectionControl, Send], PortSession]] = {
     "dashboard": DashboardSession,
     "interpreter": InterpreterSession,
@@ -56,7 +56,7 @@ _SESSIONS: Mapping[InterfaceName, Callable[[UrRobot, ConnectionControl, Send], P
     "realtime": RealtimeSession,
     "realtime_read_only": partial(RealtimeSession, read_only=True),
 }
-"""Sessions that need nothing of the interfaces."""
+"""Sessions of the interfaces that need only robot, control and connection."""
 
 
 class UrInterfaces(Gateway):
@@ -98,7 +98,7 @@ class UrInterfaces(Gateway):
         self._lockstep = lockstep
         self._news = deque[Report | Message]()  # messages for the interfaces' thread
         self._woken = False  # whether that thread has been woken and has not run yet
-        self._unread: Report | None = None  # last tick of which only temperatures and energies were computed
+        self._unread: Report | None = None  # last tick, if only its temperatures and energies were computed
         self._room = threading.Event()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._servers: list[asyncio.Server] = []
@@ -144,7 +144,7 @@ class UrInterfaces(Gateway):
         self._run(self._keep_alive())
 
     def publish(self, topic: Topic, message: Message, payload: bytes) -> None:  # noqa: ARG002  not MessagePack here
-        """Pass a message to the interfaces' thread; states come through `report`."""
+        """Pass a message to the interfaces' thread; `report` passes states."""
         if self._loop is None:
             if isinstance(message, Io):
                 self._io = message
@@ -153,7 +153,7 @@ class UrInterfaces(Gateway):
             self._wake()
 
     def report(self, report: Report) -> None:
-        """Pass a tick to the interfaces' thread, which builds its state only if there are clients."""
+        """Pass a tick to the interfaces' thread, which builds the tick's state only if there are clients."""
         if self._loop is None:  # the interfaces are not open
             self._early.append(report)
         elif not self._has_room():
@@ -198,7 +198,7 @@ class UrInterfaces(Gateway):
     # The following methods run in the interfaces' thread.
 
     def _handle_queue(self) -> None:
-        """Handle the queued messages; later ones wake this thread again, so that clients get their turn."""
+        """Handle the messages queued now. Later messages wake this thread again, so that clients are served between."""
         self._woken = False
         for _ in range(len(self._news)):
             message = self._news.popleft()
@@ -305,7 +305,7 @@ class UrInterfaces(Gateway):
             self._write(line for throttle in self._throttles.values() for line in throttle.due(now))
 
     def _log(self, what: str, line: str) -> None:
-        """Write a line about a subject to the server's console, unless there were enough of them."""
+        """Write a line about a robot or client to the server's console."""
         self._write(self._throttles[what].take(line, time.monotonic()))
 
     def _write(self, lines: Iterable[str]) -> None:

@@ -16,9 +16,9 @@ STATES: Final = {
     "statelastcleared": "cleared",
     "stateunexecuted": "waiting",
 }
-"""Questions, and the field of `Interpreter` that answers each."""
+"""Field of `Interpreter` that answers each question."""
 SKIPS: Final[dict[str, Literal["statements", "move"]]] = {"skipbuffer": "statements", "abort": "move"}
-"""Commands that are carried out at once, and what each skips."""
+"""What each command skips; these commands are carried out at once."""
 LONGEST: Final = MAX_SCRIPT
 """Longest line [bytes]."""
 ECHO: Final = 4096  # characters of a line that its answer repeats

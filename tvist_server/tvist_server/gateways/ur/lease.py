@@ -1,4 +1,4 @@
-"""Control for clients without leases: a host's connections share it from its first command until the last closes."""
+"""Control for clients that know no leases: a host's connections share control until the last of them closes."""
 
 from collections.abc import Awaitable, Callable
 
@@ -49,14 +49,14 @@ class HostLease:
         return later
 
     def leave(self, connection: object) -> None:
-        """Note that a connection is closed; release control if it was the last one that used it."""
+        """Note that a connection is closed; if no other connection uses control, release it."""
         self._users.discard(connection)
         if not self._users and self._token != _NO_TOKEN:
             token, self._token = self._token, _NO_TOKEN
             begin(self._release(token))
 
     async def _release(self, token: str) -> None:
-        """Release control, and report the client as gone unless a connection has used control again."""
+        """Release control; unless a connection has used control again meanwhile, report the client as gone."""
         await self.ask(ReleaseControl(token=token))
         if not self._users:
             self._intake.client_gone(self.client)
@@ -91,12 +91,12 @@ class HostLease:
         else:
             self._intake.client_gone(self.client)
         taking.set(reply)
-        if not self._users:  # all of them have disconnected since
+        if not self._users:  # all its users have disconnected meanwhile
             self.leave(None)
 
 
 class ConnectionControl:
-    """Access of one connection to the controller; `peer` names its client in messages."""
+    """Access of one connection to the controller; `peer` is the client's name in messages."""
 
     def __init__(
         self,
@@ -106,7 +106,7 @@ class ConnectionControl:
     ) -> None:
         self.peer, self.host = peer or lease.client, lease.host
         self._lease = lease
-        self.deliver = deliver  # handles an answer, which is a function to call
+        self.deliver = deliver  # calls a function that handles an answer
         self.unanswered = 0  # number of commands without an answer
 
     def change(self, command: MakeCommand) -> Deferred[Reply]:

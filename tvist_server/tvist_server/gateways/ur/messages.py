@@ -1,6 +1,6 @@
 """Robot messages: int32 length, uint8 20, uint64 time [µs], uint8 source, uint8 kind, body; big-endian.
 
-Their time is that of the last tick, None before the first.
+Every function takes the last tick (None before the first one), whose time goes into the message.
 """
 
 from struct import Struct, pack

@@ -13,7 +13,7 @@ Change = Callable[[UrRobot, ConnectionControl], Awaitable[Refused | None]]
 
 
 def _change(command: MakeCommand, there: Callable[[Snapshot], bool] = lambda _: False) -> Change:
-    """Return a change; a refusal counts as success if the robot is already `there`, in the requested mode."""
+    """Return a change. If the robot refuses `command` but is already `there`, in the wanted mode, this is success."""
 
     async def change(robot: UrRobot, control: ConnectionControl) -> Refused | None:
         reply, latest = await control.change(command), robot.latest
@@ -24,14 +24,14 @@ def _change(command: MakeCommand, there: Callable[[Snapshot], bool] = lambda _: 
     return change
 
 
-power_on = _change(  # of an arm that is off; its brakes stay closed
+power_on = _change(  # switches power on; the brakes stay closed
     lambda token: PowerOn(token=token, release_brakes=False),
     lambda latest: latest.robot_mode in (RobotMode.IDLE, RobotMode.BACKDRIVE, RobotMode.RUNNING),
 )
-release_brakes = _change(  # makes the arm ready to move, from any mode
+release_brakes = _change(  # also switches power on if necessary
     lambda token: PowerOn(token=token), lambda latest: latest.robot_mode == RobotMode.RUNNING
 )
-power_off = _change(lambda token: PowerOff(token=token))  # once the arm is at rest; this ends any program
+power_off = _change(lambda token: PowerOff(token=token))  # stops the motion first; ends any program
 unlock = _change(
     lambda token: UnlockProtectiveStop(token=token),
     lambda latest: latest.safety_mode != SafetyMode.PROTECTIVE_STOP,
@@ -40,6 +40,6 @@ _restart = _change(lambda token: RestartSafety(token=token))
 
 
 def restart_safety(robot: UrRobot, control: ConnectionControl) -> Awaitable[Refused | None]:
-    """Restart the safety system after a violation or a fault; otherwise power off the arm, as a restart does."""
+    """After a violation or a fault, restart the safety system; in other modes, only power the arm off."""
     failed = robot.latest is not None and robot.latest.safety_mode in (SafetyMode.VIOLATION, SafetyMode.FAULT)
     return (_restart if failed else power_off)(robot, control)

@@ -87,7 +87,7 @@ class Programs:
         return None
 
     async def run(self, text: str, control: ConnectionControl, *, secondary: bool) -> Refused | None:
-        """Start a client's script, beside the program if it is secondary, else instead of it."""
+        """Start a client's script: beside the running program if the script is secondary, else in its place."""
         lasting = control.lasting()
         reply = await lasting.change(lambda token: ProgramRun(token=token, text=text))
         if isinstance(reply, Refused):
@@ -108,7 +108,7 @@ class Programs:
         self._asked = asked
 
         def wanted() -> bool:
-            """Return False if the program was stopped, or another one loaded or started, meanwhile."""
+            """Return False if meanwhile the program was stopped, or another program was loaded or started."""
             return self._asked is asked and (self.name, self.state) == (name, state)
 
         text = await self._external.find(name)
@@ -200,7 +200,7 @@ class Programs:
             before.leave()
 
     def _count_secondary(self, *, started: bool) -> None:
-        """Count the secondary programs, and release the accesses when none runs."""
+        """Count running secondary programs; when the last one has ended, release control for all of them."""
         if started:
             self._running_secondary += 1
             self._secondary_controls += self._starting_controls

@@ -49,7 +49,7 @@ LAYOUT: Final[tuple[tuple[str | None, int], ...]] = (
     ("payload_cog", 3),
     ("payload_inertia", 6),
 )
-"""Doubles of the package: attribute of the snapshot and its length; reserved ones have no name and are 0."""
+"""Fields of the package: attribute of the snapshot (None: reserved, filled with 0) and number of doubles."""
 
 PACKAGE: Final = Struct(f">i{sum(count for _, count in LAYOUT)}d")
 _KEY: Final = "realtime"

@@ -21,7 +21,7 @@ class UrRobot:
         tell: Callable[[bytes], None],  # sends a robot message to all clients that get them
         external: ExternalControl,  # completes programs with an External Control node
         report: Callable[[str], None],  # writes a line to the server's console
-        report_refusal: Callable[[str], None],  # the same for refusals, which other lines cannot displace
+        report_refusal: Callable[[str], None],  # writes a refusal to the console, with its own limit of lines
     ) -> None:
         self.description, self.name = description, name
         self.tell, self.report, self.report_refusal = tell, report, report_refusal
@@ -34,7 +34,7 @@ class UrRobot:
 
 
 class InputOwners:
-    """A variable belongs to the first connection that requests it, until that connection closes."""
+    """Owners of input variables: the first connection that requests a variable owns it until the connection closes."""
 
     def __init__(self) -> None:
         self._owners: dict[str, object] = {}
@@ -53,10 +53,10 @@ class InputOwners:
 
 
 class PendingWrites:
-    """Values requested from the controller, so that none is requested twice although clients repeat them at 500 Hz.
+    """Values sent to the controller: clients repeat values at 500 Hz, but each is to be sent only once.
 
-    A value is new if it differs from the last one requested, or if that request is answered and the robot
-    shows another value, set by another client.
+    A value is new if it differs from the last one sent, or if that one is answered and the robot now
+    publishes another value, which another client has set.
     """
 
     def __init__(self) -> None:
@@ -64,7 +64,7 @@ class PendingWrites:
         self._waiting: dict[Hashable, object] = {}
 
     def changed(self, key: Hashable, value: object, present: object) -> bool:
-        """Return whether to request a value; the robot last published `present`, None if it has not published any."""
+        """Return whether a value must be sent; `present` is the value that the robot last published, None: none yet."""
         if key in self._waiting:
             return self._waiting[key] != value
         return value != present or self._asked.get(key, value) != value

@@ -23,24 +23,24 @@ class Unit:
     """A complete line or block."""
 
     text: str  # text with lines ended by line feeds; only its beginning if it is too long
-    line: int  # line at which its code starts, counted from 1; comments may precede it
+    line: int  # line at which its code starts, from 1; comments may precede the code
     column: int  # column in that line, counted from 1
     too_long: bool = False  # whether it is longer than `LONGEST` bytes and was therefore dropped
 
     @property
     def words(self) -> str:
-        """Its code with single spaces, for comparison with a command."""
+        """Code of the unit with single spaces, for comparison with a command."""
         return " ".join(word for line in self.text.split("\n") for word in _code(line).split())
 
     @property
     def secondary(self) -> bool:
-        """Whether it is a secondary program, which runs beside the main one."""
+        """Whether the unit is a secondary program, which runs beside the main program."""
         head = _HEAD.match(self._first)
         return head is not None and head[1] == "sec"
 
     @property
     def title(self) -> str:
-        """Title for messages: the name of the program that it defines, or its first line of code."""
+        """Title for messages: the name of the program that the unit defines, or the first line of code."""
         head = _HEAD.match(self._first)
         title = self._first if head is None else head[2]
         if len(title) > TITLE:
@@ -49,7 +49,7 @@ class Unit:
 
     @property
     def _first(self) -> str:
-        """Its first line of code, which the kept text of a unit that is too long may lack."""
+        """First line of code; of a unit that is too long, the kept text may end before that line."""
         lines = self.text.split("\n")
         return lines[min(self.line, len(lines)) - 1].strip()
 
@@ -73,7 +73,7 @@ class ScriptReader:
     @property
     def unfinished(self) -> Unit | None:
         """Beginning of the incomplete unit; None if it has no code yet."""
-        if self._skipping:  # it was returned when it became too long
+        if self._skipping:  # the unit was returned when it became too long
             return None
         line, column = self._start or (self._unit.count(b"\n") + 1, 1)
         rest = self._lines.rest
@@ -81,11 +81,11 @@ class ScriptReader:
         return Unit((self._unit + rest).decode(errors="replace"), line, column) if begun else None
 
     def feed(self, data: bytes) -> list[Unit]:
-        """Take a piece; return the units that it completes, and one that has become too long."""
+        """Take a piece of the stream; return the units that are now complete or have become too long."""
         return [unit for line in self._lines.feed(data) if (unit := self._take(line.removesuffix(b"\r")))]
 
     def _take(self, whole: bytes) -> Unit | None:
-        """Add a complete line to the present unit, which ends with the line that closes all blocks."""
+        """Add a complete line to the present unit; return the unit if this line closes all its blocks."""
         unit = None
         if not self._skipping and len(self._unit) + len(whole) >= LONGEST:
             seen = bytes(self._unit + whole)[:GLIMPSE].decode(errors="replace")

@@ -31,7 +31,7 @@ CHANGES: Final[Mapping[str, Change]] = {
 
 @dataclass(eq=False)
 class ScriptSession(InTurnSession[Unit]):
-    """Runs a few commands of the interface, and other script text as programs; the console shows the results."""
+    """Carries out the interface's own commands and runs other script text as programs; the console shows results."""
 
     read_only: bool = field(default=False, kw_only=True)  # whether commands are refused
     _reader: ScriptReader = field(default_factory=ScriptReader, init=False)
@@ -99,7 +99,7 @@ class ScriptSession(InTurnSession[Unit]):
 
 @dataclass(eq=False)
 class PrimarySession(ScriptSession):
-    """Sends a client the robot's state and messages, and takes its commands; the secondary one has no messages."""
+    """Sends state and messages to a client and takes commands; the secondary interface sends no messages."""
 
     informed: bool = field(default=True, kw_only=True)
     _errors: list[bytes] = field(default_factory=list, init=False)  # sent after the state of the tick

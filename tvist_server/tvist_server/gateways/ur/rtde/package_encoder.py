@@ -1,4 +1,4 @@
-"""Data packages of RTDE clients: values that recipes name are computed once a tick, and gathered per recipe."""
+"""Data packages for RTDE clients. Each tick, values are computed once for all recipes, then copied per recipe."""
 
 from collections.abc import Iterable
 from itertools import chain
@@ -26,7 +26,7 @@ class PackageEncoder:
         self._packages: dict[tuple[bytes, str], bytes] = {}  # packages of the last tick, by head and names
 
     def begin(self, client: object, recipe: OutputRecipe) -> None:
-        """Note that a client reads a valid recipe, instead of its previous one."""
+        """Note that a client now reads this valid recipe instead of its previous recipe."""
         self._recipes[client] = recipe
         self._bytes = self._snapshot = None
 
@@ -64,7 +64,7 @@ def _package(head: bytes, data: bytes) -> bytes:
 
 
 class _EncodedTick:
-    """Bytes of the variables of some recipes; the snapshot determines the number of joints."""
+    """Encoded variables of some recipes at one tick after another; `snapshot` gives the number of joints."""
 
     def __init__(self, recipes: Iterable[OutputRecipe], snapshot: Snapshot) -> None:
         different = {recipe.text: recipe for recipe in recipes}.values()
@@ -90,7 +90,7 @@ class _EncodedTick:
         self._io: Io | None = None
 
     def write(self, snapshot: Snapshot) -> None:
-        """Write the values of a tick, and gather those of each recipe."""
+        """Encode the values of a tick, and copy them in the order of each recipe."""
         if snapshot.io is not self._io:
             self._of_io.write(snapshot, self._buffer)
             self._io = snapshot.io
@@ -102,7 +102,7 @@ class _EncodedTick:
         return self._gathered[self._spans[recipe.text]]
 
     def _places_of(self, name: str) -> list[int]:
-        """Return the places of a variable's bytes; a short vector is filled with zeros to six entries."""
+        """Return the buffer indices of a variable's bytes; a vector of fewer than six entries is filled with zeros."""
         (part, number), wire = PARTS[name], OUTPUTS[name]
         place, size = self._places[part], wire.size // wire.length
         entries = place.entries // part.variables
@@ -120,7 +120,7 @@ class _Place(NamedTuple):
 
 
 class _Packing:
-    """Writes parts from the index `first` on in one call, and adds their places; a snapshot gives the lengths."""
+    """Packs variables into a buffer from index `first` on; adds each one's position and length to `places`."""
 
     def __init__(
         self, parts: list[OutputSource], snapshot: Snapshot, first: int, places: dict[OutputSource, _Place]

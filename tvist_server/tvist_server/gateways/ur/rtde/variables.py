@@ -1,4 +1,4 @@
-"""Names and types of input variables, which clients set, outputs, which they read, and registers."""
+"""Names and types of inputs (clients set them), outputs (clients read them) and registers."""
 
 from collections.abc import Callable, Iterator
 from fnmatch import fnmatchcase
@@ -72,7 +72,7 @@ INPUTS: dict[str, WireType] = {name: wire for name, (wire, _) in NAMED.items()} 
 
 NEED_CONTROL = frozenset(NAMED) - {"external_force_torque"}
 """Variables that only the client in control may own. Any client may write registers, which are only memory. A
-wrench serves programs of the client in control, and every connection of `ur_rtde` requests it."""
+wrench only affects programs of the client in control, and every connection of `ur_rtde` requests it."""
 
 
 @cache
@@ -102,7 +102,7 @@ class OutputSource(NamedTuple):
 
 
 def _single_bits(bank: str, snapshot: Snapshot) -> list[bool]:
-    """Return the bits of a bank that are separate variables."""
+    """Return the bits of a bank that RTDE has as one variable each."""
     words: list[int] = getattr(snapshot.io, bank)
     return [bool(words[number // 32] >> number % 32 & 1) for number in SINGLE_BITS]
 
@@ -132,4 +132,4 @@ def _parts() -> Iterator[tuple[str, tuple[OutputSource, int]]]:
 
 
 PARTS: dict[str, tuple[OutputSource, int]] = dict(_parts())
-"""OutputSource with which each output variable is read, and its index in that part."""
+"""For each output variable: the `OutputSource` that reads it, and its index among that source's variables."""

@@ -22,7 +22,7 @@ LARGEST = 1e308  # largest absolute value of an input; infinity and NaN are refu
 
 
 class InputWriter:
-    """Sets the inputs of one connection; missing ones keep their last value, and a mask is 0 before its first."""
+    """Sets the inputs of one connection. A missing input keeps its last value; a mask never sent counts as 0."""
 
     def __init__(self, robot: UrRobot, control: ConnectionControl, warn: Callable[[str], None]) -> None:
         self._robot = robot
@@ -32,7 +32,7 @@ class InputWriter:
         self._held: dict[str, Value] = {}
 
     def write(self, values: dict[str, Value]) -> None:
-        """Set the variables of one package; values that are not finite are refused individually."""
+        """Set the variables of one package, except values that are not finite, which are refused with a warning."""
         for name, value in values.items():
             numbers = value if isinstance(value, tuple) else (value,)
             if not all(abs(number) <= LARGEST for number in numbers):
@@ -106,7 +106,7 @@ class InputWriter:
             self._change({"speed": fraction}, lambda token: SetSpeed(token=token, fraction=fraction))
 
     def _set_outputs(self, values: Iterable[str]) -> None:
-        """Set, in one command, the digital and analogue outputs that the variables of a package refer to."""
+        """Set the digital and analogue outputs that a package changes, in one command."""
         groups = {name.partition("_output")[0] for name in values}
         news = {
             output: value
@@ -132,9 +132,9 @@ class InputWriter:
         )
 
     def _outputs(self, groups: set[str]) -> Iterator[tuple[tuple[str, int], Any, Any]]:
-        """Yield each output in these groups that a mask selects: kind and number, wanted and present value.
+        """Yield each output that the masks of these groups select: its kind and number, wanted and present value.
 
-        The value of an analogue output is its type and the share of its range.
+        The value of an analogue output is a pair: type, and share of the range.
         """
         io = self._io
         for group, (first, count) in DIGITAL.items():
@@ -194,7 +194,7 @@ def _present(io: Io, name: str) -> Number:
 
 
 def _runs(cells: dict[int, tuple[Number, bool]]) -> Iterator[tuple[int, tuple[Number, ...]]]:
-    """Group registers with consecutive numbers; each group spans its first to its last new value."""
+    """Yield first number and values of each run of consecutive registers, from its first to its last new value."""
     for _, group in groupby(enumerate(sorted(cells)), lambda pair: pair[1] - pair[0]):
         new = [number for _, number in group if cells[number][1]]
         if new:
