@@ -56,7 +56,7 @@ def median_interval(values: Floats) -> tuple[float, float | None, float | None]:
 
 
 def in_alternation(runs: Mapping[str, Run], repetitions: int) -> dict[str, list[float]]:
-    """Run several measurements in turn, forwards and backwards, so that a drift of the machine's speed cancels out.
+    """Run measurements in turn, forwards and backwards, so that a drift of the machine's speed cancels out.
 
     Each measurement runs once beforehand, to exclude one-time costs.
     """

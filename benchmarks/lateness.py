@@ -48,7 +48,7 @@ async def _robot(server: RunningServer, segment: float) -> float:
 
 
 async def _thread(server: RunningServer, bare: Process, segment: float) -> float:
-    """Return the ticks that the bare thread misses in a segment [% of those due], while the robot is halted."""
+    """Return the ticks the bare thread misses in a segment [% of those due], while the robot is halted."""
     # Two halts in a row would outlast the lease, so the robot reads its messages between them.
     await server.robot.advance(SETTLE_TICKS)
     os.kill(server.pid, signal.SIGSTOP)

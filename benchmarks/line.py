@@ -1,4 +1,4 @@
-"""Processor time of a tick of plant, filter, control cycle (Figure 6) and the whole line, compared with MuJoCo's."""
+"""Processor time per tick: plant, filter, control cycle (Figure 6), whole line; compared with MuJoCo's."""
 
 from collections.abc import Mapping
 

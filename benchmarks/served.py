@@ -44,7 +44,7 @@ def in_process() -> float:
 
 
 async def reader(seconds: float, tell: Tell) -> dict[str, Figure]:
-    """Measure a robot whose client reads each state, and in another process the bare line and bare puts of a state."""
+    """Measure a robot whose client reads each state; in another process, bare line and bare state puts."""
     part, endpoint = max(SHORTEST, seconds / OF_READER), free_endpoint()
     found: dict[str, list[float]] = {name: [] for name in READER}
     lines: list[float] = []

@@ -1,4 +1,4 @@
-"""A certificate authority and its certificates for mutual TLS, with P-256, since many small devices lack Ed25519."""
+"""Certificate authority and its certificates for mutual TLS, with P-256: many small devices lack Ed25519."""
 
 import ipaddress
 import os
@@ -17,7 +17,7 @@ AUTHORITY_DAYS = 7300
 """Validity of an authority's own certificate [days]; the certificates it signs expire earlier."""
 SLACK = timedelta(hours=1)  # largest lag of the clock of a client or robot
 USAGES = {"robot": ExtendedKeyUsageOID.SERVER_AUTH, "client": ExtendedKeyUsageOID.CLIENT_AUTH}
-"""Extended key usage of each kind, so that a client's certificate cannot pass as a robot's, or the reverse."""
+"""Extended key usage of each kind, so a client's certificate cannot pass as a robot's, or the reverse."""
 
 LABEL = re.compile(r"(?!-)(?=.*[A-Za-z0-9])[A-Za-z0-9_-]{1,63}")  # part of a host name between dots
 

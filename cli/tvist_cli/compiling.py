@@ -9,7 +9,7 @@ SAY_EVERY = 10.0  # shortest time between two lines about progress where stderr 
 
 
 def compile_if_new(tell: Callable[[int, int], None] = lambda *_: None) -> None:
-    """Compile kernels that are not on disk, and show progress; `tell` gets the numbers of compiled and all kernels."""
+    """Compile kernels not on disk and show progress; `tell` gets the numbers of compiled and all kernels."""
     from tvist_server.kernels import KERNELS, KernelsError, compiled
 
     done = compiled()

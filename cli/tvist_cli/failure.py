@@ -25,7 +25,7 @@ class Misuse(Failure):
 
 
 def interrupted(what: str) -> Failure:
-    """Return the failure for Control+C; `what` is the part of its message that says what was done and what not."""
+    """Return the failure for Control+C; `what` is the part of its message on what was done and what not."""
     return Failure(f"interrupted: {what}", code=130)
 
 
@@ -41,7 +41,7 @@ def interruptible(what: str) -> Iterator[None]:
 def check_range(
     name: str, value: float | None, low: float, high: float = math.inf, unit: str = "", *, above: bool = False
 ) -> None:
-    """Refuse an option's value outside `low` to `high`, with `above` also `low`; accept None, an option not given."""
+    """Refuse an option's value outside `low` to `high`, with `above` also `low`; accept None (not given)."""
     if value is None or (low <= value <= high and not (above and value == low)):
         return
     least = f"{'more than' if above else 'at least'} {low:g}"
@@ -53,7 +53,7 @@ def check_range(
 
 @contextmanager
 def failing_on(*errors: type[Exception], exit_code: int = 1, where: str = "") -> Iterator[None]:
-    """Turn errors of these types, tvist's own and those of robot options into a `Failure` with the same message.
+    """Turn these errors, tvist's own and those of robot options into a `Failure` with the same message.
 
     The exit code is `exit_code`, except: 1 for a file with wrong content; 2 for an invalid option of a
     robot, unless `errors` contains `StartError`. `where` precedes the message. If `where` is given, a

@@ -47,7 +47,7 @@ def report(
     json: bool,
     more: Mapping[str, Any] | None = None,
 ) -> None:
-    """Print the fit of the ring-downs, its uncertainty, jogs that would improve it, and a command that uses it."""
+    """Print the ring-downs' fit, its uncertainty, jogs that would improve it, and a command that uses it."""
     model, how = found.calibration.modal, found.calibration.provenance
     assert model is not None, "each calibration has springs and drives"
     crossed = list(zip(model.cross_validated_f_d_percent, model.cross_validated_zeta_percent, strict=True))

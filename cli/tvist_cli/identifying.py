@@ -1,4 +1,4 @@
-"""Identifies a robot from ring-downs of a simulation in this process, a served robot, one at ur://, or logs."""
+"""Identifies a robot by ring-downs of a simulation in this process, a served robot, one at ur://, or logs."""
 
 import asyncio
 import sys
@@ -195,7 +195,7 @@ class MovableRobot:
 
 
 def _robot_file(robot: str | None, models: set[str], what: str) -> RobotDescription:
-    """Load the robot file `robot` (name or path), or if that is None the package's file for the only model."""
+    """Load the robot file `robot` (name or path), or if None the package's file for the only model."""
     if robot is None:
         fitting = [name for name in robots() if load(name).robot.model in models]
         if len(models) != 1 or len(fitting) != 1:

@@ -17,7 +17,7 @@ LEAST_TRUTH_SHARE = 0.8
 
 
 def judge(without: "MotionRecord", shaped: "MotionRecord") -> "Verdict":
-    """Compare a motion without and with a shaper, each recorded until after its end; unknown values are None."""
+    """Compare a motion without and with a shaper, each recorded past its end; unknown values are None."""
     from tvist_lab.metrics.comparison import MotionChange, compare
     from tvist_lab.metrics.table import MeasuredRecording
 
@@ -43,7 +43,7 @@ def _recording(run: "MotionRecord") -> "Recording":
 
 
 def _between(first: "Truth", second: "Truth") -> "Iterator[Truth]":
-    """Interpolate lost truth messages between two: a gap where the acceleration falls steeply would distort it."""
+    """Interpolate truth messages lost between two: a gap where acceleration falls fast would distort it."""
     for tick in range(first.tick + 1, second.tick):
         share = (tick - first.tick) / (second.tick - first.tick)
         mixed = {

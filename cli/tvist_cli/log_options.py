@@ -32,7 +32,7 @@ class LogOptions:
     path of a robot file [that of the log, or ur5e]."""
 
     def read(self, *files: Path, sensor: bool = False) -> "list[Recording]":
-        """Read logs, and join each with the log of its sensor; RecordingError or Misuse if a log does not fit.
+        """Read logs and join each with the log of its sensor; RecordingError or Misuse if a log does not fit.
 
         If `sensor` is true and `--imu` is not given, a log may be of an accelerometer alone.
         """

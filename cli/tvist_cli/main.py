@@ -88,7 +88,7 @@ def _default(value: object) -> str | None:
 def application(called: Sequence[str] = ()) -> "cyclopts.App":
     """Return the parser for all commands and options.
 
-    The help of the command `called` (its words) is its docstring; other commands only have their one-line help.
+    The help of the command `called` (its words) is its docstring; other commands only have one-line help.
     """
     from importlib.metadata import version
 

@@ -26,7 +26,7 @@ _KINDS: dict[object, str] = {int: "a whole number", float: "a number", bool: "tr
 
 
 def readable(arguments: Iterable[str]) -> list[str]:
-    """Put a space before arguments that begin with a minus but are no options: angles, and `-` for standard input."""
+    """Put a space before non-option arguments that begin with a minus: angles, and `-` for standard input."""
     return [
         f" {argument}" if argument == "-" or _ANGLES.fullmatch(argument) else argument
         for argument in arguments
@@ -56,7 +56,7 @@ def finite(_: Any, value: Any) -> None:
 
 
 def message_of(error: CycloptsError, commands: Sequence[str]) -> str:
-    """Return a message for a parser's error; `commands` are the names of commands that were possible there."""
+    """Return a message for a parser's error; `commands` are the names of commands possible there."""
     command = " ".join(["tvist", *(error.command_chain or ())])
     seek = f"see {command} --help"
     match error:

@@ -14,7 +14,7 @@ NAMES = ("moves", "bench", "robustness", "match")
 
 
 def _offered(names: str | Callable[[], Iterable[str]], *endings: str) -> Parameter:
-    """Complete names, and files with these endings; `MODULE:FUNCTION` is imported and called only on completion."""
+    """Complete names, and files with these endings; import and call `MODULE:FUNCTION` only on completion."""
 
     def complete(context: "CompletionContext") -> list[str]:
         typed, ends = escape(context.incomplete), (*endings, "/") if any(endings) else endings

@@ -52,7 +52,7 @@ def say(message: str) -> None:
 
 
 def program() -> str:
-    """Return how to call this program from this folder: by its name if the shell finds that, else by its path."""
+    """Return how to call this program from this folder: by name if the shell finds that, else by path."""
     here, found = Path(sys.executable).with_name("tvist"), shutil.which("tvist")
     if not here.exists() or (found is not None and Path(found).samefile(here)):
         return "tvist"
@@ -137,7 +137,7 @@ def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[str]], on:
 
 
 def _parts(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> list[list[int]]:
-    """Distribute a table's columns over parts that are no wider than the screen; each begins with column 0."""
+    """Distribute a table's columns over parts no wider than the screen; each begins with column 0."""
     wide = [
         max(cell_len(line) for cell in cells for line in cell.split("\n")) + len(GAP)
         for cells in zip(columns, *rows, strict=True)
@@ -175,7 +175,7 @@ def write_json(path: Path, result: dict[str, Any]) -> None:
 
 
 def default_output(path: Path) -> Path:
-    """Return a default path; Failure if the file exists, since only files that the user has named are replaced."""
+    """Return a default path; Failure if the file exists, since only files the user named are replaced."""
     if path.exists():
         raise Failure(f"{path} exists already: choose the file with --output, which replaces what is there")
     return path

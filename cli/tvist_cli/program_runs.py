@@ -60,7 +60,7 @@ def read_script(file: Path, skip: Sequence[str] = ()) -> str:
 
 
 def programs_in(files: Sequence[Path]) -> list[Path]:
-    """Replace folders by their programs, without scripts that PolyScope has exported beside programs it saved."""
+    """Replace folders by their programs, without scripts that PolyScope exported beside programs it saved."""
     found: list[Path] = []
     for file in files:
         inside = sorted(file.rglob("*")) if file.is_dir() else [file]
@@ -72,7 +72,7 @@ def programs_in(files: Sequence[Path]) -> list[Path]:
 
 
 def read_scripts(files: Sequence[Path], skip: Sequence[str]) -> list[str | Failure]:
-    """Read programs. If there are several, return the Failure of each unreadable one, so that the others can run."""
+    """Read programs. If there are several, return the Failure of each unreadable one, so others can run."""
     found: list[str | Failure] = []
     for file in files:
         try:
@@ -132,7 +132,7 @@ class ProgramOutcome:
 
 
 class ProgramConsole:
-    """Prints messages of programs as they come (unless `quiet`), and on a terminal a line with the progress."""
+    """Prints messages of programs as they come (unless `quiet`), and on a terminal a progress line."""
 
     def __init__(self, *, quiet: bool) -> None:
         self._quiet = quiet
@@ -254,7 +254,7 @@ class Runner:
 
 
 def _refused(file: Path, text: str) -> ProgramOutcome | None:
-    """Print a program's errors and warnings before anything starts; return the outcome of one that cannot run."""
+    """Print a program's errors and warnings before anything starts; return the outcome if it cannot run."""
     findings = check_program(text)
     for finding in findings:
         say(placed(file, finding))

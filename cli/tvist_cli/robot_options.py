@@ -50,7 +50,7 @@ _IN_ANY_CASE = ("profile", "shaper", "clock")
 
 
 def with_robot_options(only: Collection[str] = ()) -> Callable[[Command], Command]:
-    """Give a command options for the fields of `ServeOptions`, or `only` some. Its last parameter must be `**given`."""
+    """Add options for `ServeOptions` fields (or `only` some) to a command with last parameter `**given`."""
 
     def decorate(command: Command) -> Command:
         signature = inspect.signature(command)
@@ -64,7 +64,7 @@ def with_robot_options(only: Collection[str] = ()) -> Callable[[Command], Comman
 
 
 def configuration(given: Mapping[str, Any], file: str | None, **defaults: object) -> "ServeConfig":
-    """Merge options: the command line overrides the file, which overrides `defaults`. StartError if one is invalid."""
+    """Merge options: command line overrides file, file overrides `defaults`. StartError if one is invalid."""
     from tvist_server.config import from_mapping
 
     source = "configuration" if file is None else f"configuration {file}"

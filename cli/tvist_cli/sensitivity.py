@@ -29,7 +29,7 @@ def print_sensitivity(
     *,
     json: bool,
 ) -> None:
-    """Compute and print the residual vibration that shapers leave if they assume a wrong frequency of a mode."""
+    """Compute and print residual vibration that shapers leave if they assume a wrong frequency of a mode."""
     import numpy as np
 
     from tvist_lab.figures import sensitivity_figure
@@ -80,7 +80,7 @@ def _print(shapers: "list[Shaper]", zeta: float, curves: list[dict[str, Any]]) -
 
 
 def _about(shaper: "Shaper", zeta: float) -> dict[str, Any]:
-    """Return name, delay, and the frequency errors between which at most 5 % vibration remains (None: no bound)."""
+    """Return name, delay, and the frequency errors between which ≤ 5 % vibration remains (None: no bound)."""
     low, high = shaper.band(0.05 * (1.0 + 1e-4), zeta)  # a peak of exactly 5 % counts as inside
     ends = [
         None if not math.isfinite(ratio) or ratio <= 0.0 else 100.0 * (1.0 / ratio - 1.0)

@@ -29,7 +29,7 @@ def load_given(place: str) -> "OwnShaper":
 
 
 def of_impulses(shaper: str) -> "Shaper":
-    """Load an impulse shaper by name or FILE.py:NAME. Refuse others: their delay does not follow from a mode."""
+    """Load an impulse shaper by name or FILE.py:NAME. Refuse others: no mode determines their delay."""
     from tvist_shaping import SHAPERS, Shaper
 
     name, own = loaded(shaper)

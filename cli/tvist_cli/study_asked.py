@@ -90,7 +90,7 @@ def _check(options: StudyOptions) -> None:
 def _asked(
     preset: Preset, name: str, options: StudyOptions, other: str = "", moves: Sequence[Move] = ()
 ) -> StudyRequest:
-    """Load what the options request. `other`: for this robot instead, with its own calibration and these moves."""
+    """Load what options request. `other`: this robot instead, with its own calibration and these moves."""
     whole = load(other or options.robot)
     masses = _masses(options.payload, whole)
     wanted = "none" if options.clean else options.disturbances
@@ -143,7 +143,7 @@ def _asked(
 
 
 def _shaper(name: str) -> Shaper:
-    """Convert a shaper given by the user to a name in lower case, the path of its file, or a loaded shaper."""
+    """Convert a shaper given by the user to a lower-case name, the path of its file, or a loaded shaper."""
     if ".py:" in name:
         return load_given(name)
     if not name.endswith(".py"):
@@ -155,7 +155,7 @@ def _shaper(name: str) -> Shaper:
 def _calibration(
     given: str | None, shaper: Shaper, modes: int, description: RobotDescription, *, modal: bool
 ) -> Calibration | None:
-    """Return the calibration named `given`, or else the robot's own, which for several modes is a modal one."""
+    """Return the calibration named `given`, else the robot's own, which for several modes is a modal one."""
     own = (shaper,) if isinstance(shaper, OwnShaper) else ()
     name = shaper.name if isinstance(shaper, OwnShaper) else shaper
     known = Registry(one.shaper for one in own)

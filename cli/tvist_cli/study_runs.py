@@ -43,7 +43,7 @@ def run(
     scheduler: str | None,
     json: bool,
 ) -> None:
-    """Run a study, given by name or file; Failure if an option is invalid, the study cannot run, or rows failed."""
+    """Run a study (name or file); Failure if an option is invalid, the study cannot run, or rows failed."""
     executor = _executor(processes, scheduler)
     look.check(figures, report, options.save_moves)
     if file is None:

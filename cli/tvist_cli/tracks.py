@@ -114,7 +114,7 @@ def compared(shapers: Sequence[str], robot: str) -> Shows:
 
 
 def _look_of(content: RecordingFile) -> Look:
-    """Return how to draw a recording's robot: as recorded, or by the robot file that a server has recorded."""
+    """Return how to draw a recording's robot: as recorded, or by the robot file that a server recorded."""
     info, start = content.info, content.start or {}
     if info is not None and info.geometry is not None:
         return Look(info.geometry, info.payload)

@@ -92,8 +92,8 @@ def main() -> None:
             state: dict[str, Any] = msgpack.unpackb(inbox.get(timeout=5.0))
             return state
 
-        # If this program dies, this token disappears, and the robot ends its control at once. The session's id
-        # distinguishes this program from another one with the same client name.
+        # If this program dies, this token disappears, and the robot ends its control at once. The session's
+        # id distinguishes this program from another one with the same client name.
         alive = session.liveliness().declare_token(f"tvist/{ROBOT}/client/bare/{session.info.zid()}")
         token = ask(session, "command", type="take_control", client="bare", lease_s=30.0)["token"]
         q = next_state()["target_q"]

@@ -62,7 +62,7 @@ def make_payload(mass: float, com: Iterable[float], inertia: Iterable[float]) ->
 
 
 def _plain(value: Any, name: str, hint: Any) -> Any:
-    """Convert a value to numbers, strings and lists; one frequency or ratio becomes a list, 1 for a bool True."""
+    """Convert to numbers, strings and lists; one frequency or ratio becomes a list, 1 for a bool True."""
     try:
         plain = msgspec.to_builtins(value, builtin_types=(bytes, bytearray, Decimal), enc_hook=_builtin)
     except (TypeError, RecursionError, OverflowError) as error:

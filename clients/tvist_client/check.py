@@ -25,7 +25,7 @@ TELEMETRY_S = 3.0  # longest wait for telemetry, which comes once a second [s]
 ON_TIME = 0.9  # smallest share of the due states that counts as the full rate [-]
 TOO_SLOW = 0.5  # share of the due ticks below which the robot is overloaded, whatever its telemetry says [-]
 LONG_US = 20_000.0
-"""Lateness above which a tick is reported [µs], if its thread waited for a processor at least half as long."""
+"""Lateness above which a tick is reported [µs] if its thread waited for a processor at least half as long."""
 RETRY_S = 0.5  # time between two attempts while a robot is starting [s]
 STALE = "check"  # a token that no lease has
 
@@ -216,7 +216,7 @@ class _Check:
 
 
 def _remedy(last: Telemetry | None, due: float) -> str:
-    """Return the remedy for a low rate of states; it depends on whether the robot or the network is the cause."""
+    """Return the remedy for a low rate of states; it depends on whether robot or network is the cause."""
     if last is not None and last.ticks_per_second >= ON_TIME * due:
         return (
             f": the robot itself makes {last.ticks_per_second:.0f} ticks/s; next, look at the network and at the "

@@ -77,7 +77,7 @@ class Sent(Described):
         self._kind, self._carry_out, self._positional, self._returns = kind, carry_out, positional, returns
 
     def __call__(self, owner: Any, *values: Any, **named: Any) -> Coroutine[Any, Any, Any]:
-        """Return a coroutine that sends the command; it has this method's name, which Python's warnings show."""
+        """Return a coroutine to send the command; it has this method's name, which Python's warnings show."""
         try:
             given = self.__signature__.bind(owner, *values, **named).arguments
         except TypeError as error:

@@ -87,7 +87,7 @@ class Connection(Questions):
         return self._ios.listen(callback)
 
     async def io(self) -> Io:
-        """Return inputs, outputs, registers and tool: the latest values, or if none have come yet the next ones (1 s).
+        """Return inputs, outputs, registers and tool: latest values, or if none came yet the next ones (1 s).
 
         Raises:
             AnswerTimeoutError: No message arrived within `STATE_S`.
@@ -205,9 +205,9 @@ class Connection(Questions):
         return await self._states.next(lambda state: state.tick >= tick, STATE_S)
 
     async def rest(self) -> State:
-        """Step time, or wait if this client cannot, until the shaped reference is at rest; return the first state then.
+        """Step time, or wait if this client cannot, until the shaped reference is at rest.
 
-        The arm may still vibrate.
+        Returns the first state then. The arm may still vibrate.
         """
         while True:
             tick = await self._let_pass(CHUNK)
@@ -231,7 +231,7 @@ class Connection(Questions):
         return tick
 
     async def _let_pass(self, ticks: int) -> int | None:
-        """Step time. Return None if this client cannot: in real time, or if another client holds the clock."""
+        """Step time; None if this client cannot: in real time, or if another client holds the clock."""
         if await self.clock() == "realtime":
             return None
         try:

@@ -49,7 +49,7 @@ class Stream(AsyncIterator[Item], Generic[Item]):
         self._news.set()
 
     def end(self, error: ClientError | None) -> None:
-        """Let the reader get the waiting messages, then raise `error` once, or end the iteration if it is None."""
+        """Let the reader get waiting messages, then raise `error` once, or end iteration if it is None."""
         self._error, self._finished = error or self._error, error is None
         self._news.set()
 
@@ -66,7 +66,7 @@ class Stream(AsyncIterator[Item], Generic[Item]):
 
 
 class Feed(Generic[M]):
-    """Messages of one topic. The first listener subscribes. With `once_a_tick`, repeated ticks are dropped."""
+    """Messages of a topic. The first listener subscribes. With `once_a_tick`, repeated ticks are dropped."""
 
     def __init__(self, transport: Transport, topic: Topic, kind: type[M], *, once_a_tick: bool) -> None:
         self.latest: M | None = None
@@ -99,7 +99,7 @@ class Feed(Generic[M]):
         return lambda: self._listeners.remove(callback)
 
     def stream(self, buffer: int) -> Stream[M]:
-        """Return an iterator over all messages from now on; the feed only keeps a weak reference to the iterator."""
+        """Return an iterator over all messages from now on; the feed only keeps a weak reference to it."""
         stream = Stream[M](whole(buffer, "buffer", 1))
         self.subscribe()
         self._streams.add(stream)
@@ -121,7 +121,7 @@ class Feed(Generic[M]):
             self._waiting.pop(message, None)
 
     def end(self, error: ClientError, *, closed: bool = False) -> None:
-        """Raise `error` in waits and streams; if `closed`, end the streams without it. Later ticks may start again."""
+        """Raise `error` in waits and streams; if `closed`, streams just end. Later ticks may start again."""
         self._finished = closed
         self.latest = None
         for stream in tuple(self._streams):

@@ -26,7 +26,7 @@ from tvist_protocol.codec import decode, decode_reply, encode
 T = TypeVar("T")
 ANSWER_S = 3.0  # longest wait for a robot's answer [s]
 SETTLE_S = 0.3
-"""Time after opening a session in which tokens of robots arrive [s]; `look` also finds those that come later."""
+"""Time after opening a session in which tokens of robots arrive [s]; `look` also finds later ones."""
 LISTEN_S = 1.3  # time in which every robot in real time publishes its telemetry at least once [s]
 _TIMING = ("ticks_per_second", "missed_ticks", "late_p99_us", "load", "due_ticks", "overloaded")
 """Fields of `FleetRobot` that come from telemetry."""
@@ -181,7 +181,7 @@ class Fleet(FleetSession):
     async def _ask(
         self, place: RobotPlace, leaf: keys.Leaf, data: bytes | None, read: Callable[[bytes], T]
     ) -> T | str:
-        """Return a robot's answer, or why there is none: raising an error would end the queries of other robots."""
+        """Return a robot's answer, or why there is none: an error would end the queries of other robots."""
         reply = await ask(self._session, place.key(leaf), data, ANSWER_S)
         if reply is None and place in self.places and self._security is not None:
             return "it takes no commands from this client: use an operator's certificate (`tvist keys --operator`)"

@@ -75,7 +75,7 @@ class Motion:
 
 
 class MotionsByNumber:
-    """The motions of one robot by number. The answer or the first event, whichever comes first, creates a motion."""
+    """A robot's motions by number. The answer or the first event, whichever comes first, creates a motion."""
 
     def __init__(self, pass_time: Callable[[Motion], Awaitable[None]]) -> None:
         self._pass_time, self._motions = pass_time, dict[int, Motion]()

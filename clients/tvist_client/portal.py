@@ -26,10 +26,11 @@ class Portal:
         self.closed = False
 
     def call(self, function: Callable[[], Any]) -> Any:
-        """Run a function on the loop; wait for its result, or that of its coroutine. Ctrl-C cancels the coroutine.
+        """Run a function on the loop and wait for its result, or that of its coroutine.
 
-        An error of the client or protocol is raised without the distracting part of its traceback within the loop.
-        Raise NotConnectedError if the portal is closed; MisuseError in a callback, because the call would never return.
+        Ctrl-C cancels the coroutine. An error of the client or protocol is raised without the distracting
+        part of its traceback within the loop. Raise NotConnectedError if the portal is closed; MisuseError
+        in a callback, because the call would never return.
         """
         if self.closed:
             raise NotConnectedError("the connection is closed: open another one")
@@ -58,7 +59,7 @@ class Portal:
             yield value
         except BaseException as error:
             if sys.is_finalizing():
-                # At exit the interpreter discards a generator that was never left, after the loop's thread has ended.
+                # At exit the interpreter discards a generator never left, after the loop's thread has ended.
                 raise
             if not self.call(partial(context.__aexit__, type(error), error, error.__traceback__)):
                 raise

@@ -57,7 +57,7 @@ async def look(robot: Robot, unlock: str = "tvist unlock") -> Readiness:
 
 
 def readiness(info: Info, state: State | None, unlock: str = "tvist unlock") -> Readiness:
-    """Judge readiness from the robot's messages; `state` is only needed if an old server's `info` lacks the modes."""
+    """Judge readiness from messages; `state` is only needed if an old server's `info` lacks the modes."""
     robot = info.robot_mode if info.robot_mode is not None or state is None else state.robot_mode
     safety = info.safety_mode if info.safety_mode is not None or state is None else state.safety_mode
     if robot is None or safety is None:

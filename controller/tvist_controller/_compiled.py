@@ -16,5 +16,5 @@ def compiled(function: F) -> F:
 
 
 def compiled_for_ticks(function: F) -> F:
-    """Compile a function that takes microseconds and keeps the GIL, so that no other thread takes the GIL meanwhile."""
+    """Compile a function that takes microseconds and keeps the GIL, so no other thread takes it meanwhile."""
     return compile_function(function)

@@ -110,7 +110,7 @@ def geometry_of(description: RobotDescription, things: Things | None = None) -> 
 def stopping(description: RobotDescription) -> tuple[Stopping, ...]:
     """Return the stops of the joint that takes longest to stop, without payload and with the rated payload.
 
-    One joint turns, either way, with the arm stretched out. The first call for a description takes twenty ticks.
+    One joint turns, either way, with the arm stretched out. The first call for a description takes 20 ticks.
     """
     return _found(msgspec.json.encode(description))
 

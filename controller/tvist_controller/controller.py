@@ -106,7 +106,7 @@ class Controller(RobotParts):
     def receive_setpoint(
         self, setpoint: c.Setpoint | Unreadable | None, note: Callable[[], None] | None = None
     ) -> None:
-        """Take a set-point, or count one that was refused (None). `note` journals it if its sender has control."""
+        """Take a set-point, or count a refused one (None). `note` journals it if its sender has control."""
         self.counters.setpoints_received += 1
         if setpoint is None or not is_holders(self.session.lease, setpoint.token):
             self.counters.setpoints_refused += 1  # not part of the stream or the journal

@@ -126,7 +126,7 @@ class Host:
             self._tick()
 
     def _stop_for(self, error: Exception) -> str:
-        """Stop the robot in the next tick after an exception and return the reason; raise it unless `survives`."""
+        """Stop the robot in the next tick for `error` and return the reason; raise it unless `survives`."""
         if not self._survives:
             raise error
         why = f"the controller has failed, see the server's log: {named(error)}"
@@ -229,7 +229,7 @@ class Host:
         return self.controller.cell.answer(request)
 
     def warn(self, why: str) -> None:
-        """Send clients a warning about something outside the controller; a replay does not repeat this warning."""
+        """Send clients a warning about something outside the controller; a replay does not repeat it."""
         event = Event(tick=self._next, kind="warning", why=why)
         for sink in self._sinks:
             sink.event(event)

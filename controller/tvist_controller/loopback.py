@@ -49,7 +49,7 @@ class LoopbackHost(Sink):
         return self._host.info()
 
     def subscribe(self, topic: Topic, callback: Callable[[bytes], object]) -> Callable[[], None]:
-        """Call a function with each message of a topic, first the present state or io; return a function to end it."""
+        """Call a function with a topic's messages, first present state or io; return a function to end it."""
         callbacks = self._callbacks.setdefault(topic, [])
         callbacks.append(callback)
         if topic == "state":

@@ -120,7 +120,7 @@ def _pose(text: str, poses: Mapping[str, tuple[float, ...]], *, degrees: bool) -
 
 
 def _tool_numbers(text: str, *, by: bool, degrees: bool) -> tuple[float, ...]:
-    """Parse a target of the tool: displacement (`by`) or position [m], or position and rotation vector [rad]."""
+    """Parse a tool target: displacement (`by`) or position [m], or position and rotation vector [rad]."""
     numbers = _numbers(text)
     if len(numbers) not in ({3} if by else {3, 6}):
         pose = f"a position x,y,z in m, or x,y,z,rx,ry,rz in m and {'degrees' if degrees else 'rad'}"

@@ -55,7 +55,7 @@ def robots(
 def _measured(
     known: dict[str, Any], description: "RobotDescription", moves: int, vary: float, seed: int
 ) -> list[dict[str, Any]]:
-    """Measure an arm as described, and stiffer and softer by `vary` [%]; no results if it has too few joints."""
+    """Measure an arm as described, and stiffer and softer by `vary` [%]; no results for too few joints."""
     from tvist_controller.sources.calibrations import load
     from tvist_lab.identification.ring_downs import IdentificationError
     from tvist_lab.studies.arms.measure import ALONE, measure

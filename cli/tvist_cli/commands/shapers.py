@@ -147,7 +147,7 @@ def _about(shaper: "AnyShaper", f_d: float, zeta: float) -> dict[str, Any]:
 
 
 def _band(impulses: "Impulses", f_d: float, V: float, zeta: float) -> list[float | None] | None:
-    """Return lowest and highest f/f_d of the band around f_d (highest None: unbounded); None: f_d is outside."""
+    """Return lower and upper f/f_d of the band around f_d (upper None: unbounded); None: f_d is outside."""
     from tvist_shaping import band
 
     low, high = (f / f_d for f in band(impulses, f_d, zeta, V * TOUCHING))

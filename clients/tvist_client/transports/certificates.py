@@ -19,9 +19,9 @@ from tvist_client.errors import NotConnectedError
 
 AUTHORITY, CERTIFICATE, KEY = "authority.pem", "client.pem", "client.key"
 OPEN_MS = 15_000
-"""Longest time to open a session [ms]; if a hundred connections fail at once, the server delays the next by 10 s."""
+"""Longest time to open a session [ms]; if 100 connections fail at once, a server delays the next by 10 s."""
 PROBE_S = 4.0
-"""Longest wait in a probe [s]: twice the time for which a robot without TLS waits for the rest of a message."""
+"""Longest wait in a probe [s]: twice the time that a robot without TLS waits for the rest of a message."""
 
 Folder = str | os.PathLike[str]
 
@@ -55,10 +55,10 @@ def settings(endpoint: str, security: Folder | None) -> dict[str, Any]:
 
 
 def why_refused(endpoint: str, security: Folder | None, whose: str = "robot") -> str | None:
-    """Return why no session could be opened. Zenoh does not report this, so a separate handshake finds it out.
+    """Return why no session could be opened.
 
-    Blocks for at most three times `PROBE_S`. None: another cause, such as that no server listens. `whose` is for
-    messages.
+    Zenoh does not report this, so a separate handshake finds it out. Blocks for at most three times
+    `PROBE_S`. None: another cause, such as that no server listens. `whose` is for messages.
     """
     protocol, _, address = re.split("[?#]", endpoint)[0].partition("/")
     if protocol not in {"tcp", "tls"}:

@@ -13,7 +13,7 @@ MAX_WAITING = 10_000  # number of messages that may wait while the loop is busy:
 
 
 class Inbox:
-    """Passes messages of all topics to callbacks on the loop, in one queue: a tick's events must precede its state."""
+    """One queue of all topics' messages to callbacks on the loop: a tick's events must precede its state."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         self.dropped = 0
@@ -23,7 +23,7 @@ class Inbox:
         self._woken = False
 
     def put(self, callback: Callback, data: bytes, *, droppable: bool) -> None:
-        """Add a message, from any thread. If the queue is full, drop a `droppable` message (states, not events)."""
+        """Add a message, from any thread; a full queue drops it if `droppable` (states, not events)."""
         if droppable and len(self._waiting) >= MAX_WAITING:
             if not self.dropped:
                 log.warning("the event loop has been busy for too long: messages are being dropped")

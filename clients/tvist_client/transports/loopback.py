@@ -19,7 +19,7 @@ class InProcessRobot(Protocol):
         """Take an encoded set-point."""
 
     def subscribe(self, topic: Topic, callback: Callable[[bytes], None]) -> Callable[[], None]:
-        """Call a function with each message of a topic, first with the present one; the returned function ends this."""
+        """Call a function with a topic's messages, first the present one; the returned function ends this."""
 
     def info(self) -> bytes:
         """Return the encoded `info`."""

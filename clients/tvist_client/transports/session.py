@@ -62,7 +62,7 @@ def ask(
 ) -> asyncio.Future[zenoh.Reply | None]:
     """Query one key, from the loop. The result is the first answer, or None if nobody answers.
 
-    If a query reaches no queryable, Zenoh ends it at once; if it is not answered, with an error at its timeout.
+    If a query reaches no queryable, Zenoh ends it at once; if unanswered, with an error at its timeout.
     """
     loop = asyncio.get_running_loop()
     answer: asyncio.Future[zenoh.Reply | None] = loop.create_future()

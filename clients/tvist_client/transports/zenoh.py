@@ -85,7 +85,7 @@ class ZenohTransport(Transport):
         try:
             return await self._get(keys.key(self._robot, "command"), data, timeout_s)
         except NotConnectedError:
-            # If the robot was present all the time and answers now, access control must have dropped the command.
+            # If the robot was always present and answers now, access control must have dropped the command.
             if self._endpoint.startswith("tls/") and self._alive.is_set():
                 await self.info()
                 if self._losses == losses:

@@ -1,4 +1,4 @@
-"""The control line for studies: the blocks of the paper's Figure 6, parameters, joint motions, the tool's pose."""
+"""The control line for studies: blocks of the paper's Figure 6, parameters, joint motions, tool pose."""
 
 from tvist_controller.foresight.collision import CLEARANCE, CollisionModel
 from tvist_controller.foresight.stops import resting_after

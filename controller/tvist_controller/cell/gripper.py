@@ -106,7 +106,7 @@ class Gripper:
 
     @property
     def _fault(self) -> int:
-        """Fault code: 11 or 15 during or after automatic release; 7 or 5 for a request before or during activation."""
+        """Fault code: 11 during, 15 after automatic release; for requests, 7 before, 5 during activation."""
         if self._written["ATR"]:
             return 15 if self._released else 11
         if self._written["GTO"] and not self._active:
@@ -146,7 +146,7 @@ class Gripper:
         return (slow + share * (fast - slow)) * PERIOD / self.stroke * (CLOSED - OPEN)
 
     def tick(self, meet: Meet) -> Moved:
-        """Move the fingers for a tick; while they close and hold nothing, `meet` finds the part between them."""
+        """Move fingers for a tick; while they close and hold nothing, `meet` finds the part between them."""
         target, position = self._target, self._position
         if target is None:
             return _NOTHING
@@ -193,7 +193,7 @@ class Requests:
         self._received = b""
 
     def cut(self, data: bytes) -> list[bytes]:
-        """Return the requests that new data completes; a GET without line feed is complete if it arrives alone."""
+        """Return the requests that new data completes; a GET without line feed is complete if alone."""
         if not self._received and _BARE_GET.fullmatch(data):
             return [data]
         *lines, rest = (self._received + data).split(b"\n")

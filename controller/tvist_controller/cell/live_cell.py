@@ -156,7 +156,7 @@ class LiveCell:
         self._emit("text", why=f"cell: the tool {tool.name} ({tool.mass:g} kg) is on the flange")
 
     def _move_real_fingers(self, gripper: Gripper, hand: Plant) -> None:
-        """Move fingers whose contacts the plant simulates: an object that stops the fingers counts as gripped."""
+        """Move fingers whose contacts the plant simulates: an object that stops fingers counts as gripped."""
         opening = hand.opening()
         if gripper.holds and opening < gripper.opening - STALLED:
             self._emit("warning", why="cell: the gripper has lost what it held")

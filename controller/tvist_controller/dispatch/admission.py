@@ -63,7 +63,7 @@ def admit_command(command: Command, lease: Lease | None, clock: Lease | None = N
 
 
 def admit_setpoint(data: bytes, lease: Lease | None) -> Setpoint | Unreadable | None:
-    """Decode a set-point; return None unless its token is that of `lease`. The controller checks the token again."""
+    """Decode a set-point; return None unless its token is that of `lease`. The controller checks it again."""
     if lease is None or len(data) > EXPLAINED_BYTES:
         return None
     setpoint: Setpoint | Unreadable

@@ -59,7 +59,7 @@ class LineParameters:
         self.use(chosen)
 
     def estimate(self, chosen: FilterChoice) -> None:
-        """Use a filter with modes from another estimator, as `choose` does; warn if they do not suit the payload."""
+        """Choose a filter with modes from another estimator; warn if they do not suit the payload."""
         self.choose(chosen)
         self._warn_of_payload()
 
@@ -110,12 +110,12 @@ class LineParameters:
         self._emit("learnt", why=f"the declared {self.declared.mass:g} kg are assumed again")
 
     def _clear_with(self, payload: Payload, tvist: Filter | None) -> None:
-        """Put a payload into the collision model; raise RefusalError if the rest of the motion would then collide."""
+        """Put a payload in the collision model; RefusalError if the rest of the motion would then collide."""
         move = self._motion.motions.move
         self._motion.ahead.check_payload(body(payload), tvist, () if move is None else move.coming)
 
     def _assume(self, payload: Payload, tvist: Filter | None, ticks: int, *, told: bool = False) -> None:
-        """Phase in a payload, and its filter unless None; `told`: clients are warned of an overload separately."""
+        """Phase in a payload, and its filter if any; `told`: clients are warned of an overload separately."""
         self.assumed, carried = payload, body(payload)
         self._cycle.dynamics.declare(carried, ticks)
         if tvist is not None:

@@ -44,7 +44,7 @@ class Planner:
     def plan(
         self, command: Command, now: PlanningState, *, within_tick: bool = False, checked: bool = False
     ) -> Plan:
-        """Plan a command, or refuse it, in the state `now`; `checked`: the command has passed the check of its row."""
+        """Plan a command, or refuse it, in the state `now`; `checked`: it has passed the check of its row."""
         row = COMMANDS[type(command)]
         planning = row.plan
         assert planning is not None, "the command is carried out without a plan"

@@ -44,7 +44,7 @@ CLOCK = _Words(
 
 
 def check_token(held: Lease | None, token: str, where: str = "token", words: _Words = CONTROL) -> Lease:
-    """Return `held` (a lease, or a hold of the clock with `CLOCK`) if it has this token, else raise RefusalError."""
+    """Return `held` (lease, or hold of the clock with `CLOCK`) if it has this token, else RefusalError."""
     if held is None:
         raise RefusalError("no_control", where, words.nobody)
     if token != held.token:
@@ -101,7 +101,7 @@ class ControlHolders(NamedTuple):
 
 
 class Authority:
-    """Lease and hold of the clock of a robot. The end of a lease stops motion; `instance` makes tokens unique."""
+    """Lease and hold of the clock of a robot. A lease's end stops motion; `instance` makes tokens unique."""
 
     def __init__(
         self,

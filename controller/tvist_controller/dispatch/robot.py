@@ -128,7 +128,7 @@ class RobotParts(ABC):
         return fingerprint(self.setup.description)
 
     def snapshot(self, time: float | None = None) -> PlanningState:
-        """Return the state for plans; if `time` [s] is given, for a path that extends the running motion after it."""
+        """Return the state for plans; if `time` [s] is given, for extending the running motion after it."""
         return self.motion.snapshot(self.assumed.present(), self.programs.statements.last, time)
 
     def io(self, *, wrench: bool = True) -> Io:
@@ -166,7 +166,7 @@ class RobotParts(ABC):
 
 
 def _cycle(setup: Setup, first: FilterChoice, plant: Plant | None) -> ControlCycle:
-    """Create the control line and its arm. If the start is invalid, or no truth can be published, raise ValueError."""
+    """Create control line and arm; raise ValueError if the start is invalid or no truth can be published."""
     try:
         cycle = ControlCycle(
             setup.description, first.tvist, elastic=first.elastic, q=np.array(setup.q, dtype=float),

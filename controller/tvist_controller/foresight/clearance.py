@@ -1,9 +1,10 @@
 """Distances between capsules of an arm and the floor, and lower bounds while joints turn, compiled.
 
-A capsule contains all points within its radius of its axis, a line segment. Only the joints between two bodies
-change the distance between them. If joint j turns at q̇_j, the distance changes at most at |q̇_j| times r, where r
-is the smaller of the bodies' largest distances from the joint: the nearest points of both surfaces lie on a
-common normal, and if both points turned with the joint, their velocities along this normal would be equal.
+A capsule contains all points within its radius of its axis, a line segment. Only the joints between two
+bodies change the distance between them. If joint j turns at q̇_j, the distance changes at most at |q̇_j|
+times r, where r is the smaller of the bodies' largest distances from the joint: the nearest points of both
+surfaces lie on a common normal, and if both points turned with the joint, their velocities along this normal
+would be equal.
 """
 
 import math
@@ -148,9 +149,10 @@ def stop_has_room(
 
 @compiled_for_ticks
 def stop_phases(v: float, a: float, limit: float, jerk: float) -> tuple[float, float, float, float, float]:
-    """Return durations [s] and jerks [rad/s^3] of a stop: first phase, first jerk, middle phase, last phase, last jerk.
+    """Return the phases of a stop: durations [s] and jerks [rad/s^3].
 
-    The initial acceleration may exceed its limit.
+    Order: first phase, first jerk, middle phase, last phase, last jerk. The initial acceleration may
+    exceed its limit.
     """
     # Without braking, the velocity would become this while the acceleration is reduced to zero.
     left = v + 0.5 * a * abs(a) / jerk

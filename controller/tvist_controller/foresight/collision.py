@@ -79,7 +79,7 @@ class CollisionModel:
         self.declare(payload)
 
     def meeting(self, q: Floats) -> CloseBodies | None:
-        """Return the closest pair of bodies at a posture if their distance is below `CLEARANCE`, else None."""
+        """Return the closest pair of bodies at a posture if closer than `CLEARANCE`, else None."""
         gaps = self._gaps(q)
         number = int(np.argmin(gaps)) if len(gaps) else None
         return None if number is None or gaps[number] >= CLEARANCE else self._meeting_of(gaps, number)
@@ -97,7 +97,7 @@ class CollisionModel:
         return None
 
     def on_way(self, way: CheckedMotion, *, before: Floats | None = None) -> tuple[float, CloseBodies] | None:
-        """Return where bodies first come too close on a path (share of the path), and these bodies; else None.
+        """Return where bodies first come too close on a path (share of it), and these bodies; else None.
 
         Steps are long where all bodies are far apart. If a pair is too close at the start, or at the posture
         `before` the path, it may separate but not come closer.
@@ -115,7 +115,7 @@ class CollisionModel:
             share = 1.0 if travel <= 0.0 else min(share + max(nearest - CLEARANCE, SHORT) / travel, 1.0)
 
     def is_spacious(self, q: Floats, turned: Floats) -> bool:
-        """Return whether bodies certainly stay apart while the joints turn by up to these angles around a posture."""
+        """Return whether bodies certainly stay apart while joints turn by up to these angles from q."""
         return rooms(*self._parts, q, turned, self._found) > CLEARANCE + BOUND_MARGIN
 
     def stop_is_spacious(self, state: Target, acceleration: float, jerk: float) -> bool:

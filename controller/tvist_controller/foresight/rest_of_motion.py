@@ -1,4 +1,4 @@
-"""Checks of the coming motion: the guard of streams and guided motions, and collisions in the rest of a motion."""
+"""Checks of coming motion: guard of streams and guided motions, collisions in the rest of a motion."""
 
 from collections.abc import Sequence
 
@@ -24,9 +24,10 @@ MARGIN = 0.8
 class StreamGuard(Guard):
     """Decides whether a reference may be played: only if the arm can then stop without collision.
 
-    If the whole stop from the new state is clear, the reference is played. Otherwise the arm stops from the previous
-    state; that stop was checked a tick earlier, so a clear stop always exists. Bounds take microseconds. If they
-    prove a stop clear, it is computed only when needed. `reach` is the joints' range, which streams keep by themselves.
+    If the whole stop from the new state is clear, the reference is played. Otherwise the arm stops from the
+    previous state; that stop was checked a tick earlier, so a clear stop always exists. Bounds take
+    microseconds. If they prove a stop clear, it is computed only when needed. `reach` is the joints' range,
+    which streams keep by themselves.
     """
 
     def __init__(
@@ -90,7 +91,7 @@ class StreamGuard(Guard):
         return False
 
     def _permitted(self, state: Target) -> float | JointStop | None:
-        """Return a clear stop, or its acceleration if the stop can be computed later; None if no stop is clear."""
+        """Return a clear stop, or its acceleration to compute the stop later; None if no stop is clear."""
         stops = self._stops
         allowed = MARGIN * self._torque.acceleration(state.q, state.qd)
         acceleration = min(max(allowed, GENTLEST_STOP), stops.highest)
@@ -103,7 +104,7 @@ class StreamGuard(Guard):
         return stop if self.clear(stop) else stops.by_joints(state, None, self.clear)
 
     def _is_inside(self, q: Floats, turned: Floats) -> bool:
-        """Return whether all joints certainly stay in range while they turn by up to these angles around q."""
+        """Return whether all joints certainly stay in range while turning by up to these angles around q."""
         return self._reach is None or bool((np.abs(q) + turned <= self._reach).all())
 
     def _beyond(self, stop: JointStop) -> str | None:
@@ -116,7 +117,7 @@ class StreamGuard(Guard):
         return f"joint {joint} would pass the end of its range, ±{self._reach[joint]:g} rad"
 
     def turned(self, qd: Floats, qdd: Floats, acceleration: float, jerk: float | None = None) -> Floats:
-        """Return upper bounds of each joint's turn in a stop, shape (n,) [rad]; `jerk` is by default that of stops."""
+        """Return upper bounds of joint turns in a stop, (n,) [rad]; `jerk` is by default that of stops."""
         jerk = self._stops.jerk if jerk is None else jerk
         fastest = _fastest(qd, qdd, jerk)
         ramps = (acceleration + np.abs(qdd)) / jerk
@@ -158,7 +159,7 @@ class RemainingMotion:
         return guard
 
     def until_rest(self, plan: StopPlan | None = None) -> tuple[float | None, float | None]:
-        """Return time [s] and largest joint turn [rad] until rest, for `plan` if given; None if too far ahead."""
+        """Return time [s] and largest joint turn [rad] to rest, of `plan` if given; None if too far ahead."""
         if plan is not None:
             return plan.duration, plan.way
         if (ahead := self._stopper.foresee()) is None:
@@ -166,13 +167,13 @@ class RemainingMotion:
         return max(resting_after(ahead) - 1, 0) * PERIOD, float(np.abs(ahead[-1] - ahead[1]).max())
 
     def after_stream(self, end: JointStop) -> CloseBodies | None:
-        """Return bodies that come too close while the stop that ends a stream runs through the filter, else None."""
+        """Return bodies that come too close as a stream's final stop runs through the filter, else None."""
         if self._tail_is_spacious(end):
             return None
         return self._on(self._stopper.foresee(trajectory=end))
 
     def rest_of_way(self, tvist: Filter | None, parts: Sequence[PlannedMotion]) -> CloseBodies | None:
-        """Return bodies that come too close with a new filter in the rest of a motion (if unknown, in a stop)."""
+        """Return bodies that get too close with a new filter in the rest of a motion (if unknown, a stop)."""
         cycle = self._cycle
         coming = [part.path.whole for part in parts]
         if cycle.mode.at_rest:
@@ -227,7 +228,7 @@ class RemainingMotion:
         )
 
     def _on(self, ahead: Floats | None) -> CloseBodies | None:
-        """Return the first bodies that come too close along references, one per tick, shape (k, n), else None."""
+        """Return the first bodies too close along references, one per tick, shape (k, n), else None."""
         if ahead is None:
             return None
         steps = np.abs(np.diff(ahead, axis=0)).max(axis=0)

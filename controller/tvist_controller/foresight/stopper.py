@@ -30,8 +30,8 @@ class Stopper:
     def foresee(self, tvist: Filter | None = None, trajectory: Trajectory | None = None) -> Floats | None:
         """Simulate the motion until rest if no command comes, optionally with another filter or trajectory.
 
-        Returns the last two shaped references played, then all until rest, shape (k, n) [rad]; None if rest is
-        more than `MAX_AHEAD` ticks ahead or the trajectory gets stuck. Stops bypass filters.
+        Returns the last two shaped references played, then all until rest, shape (k, n) [rad]; None if rest
+        is more than `MAX_AHEAD` ticks ahead or the trajectory gets stuck. Stops bypass filters.
         """
         ahead = LineSimulation(*self._cycle.fork(tvist, trajectory))
         with suppress(StuckError):
@@ -42,8 +42,9 @@ class Stopper:
         """Come to rest as quickly as permitted; `deceleration` None means the largest that torque permits.
 
         A motion stays on its path, is never ahead of the uninterrupted motion, and rests no later. If no stop
-        within the torque limits does that, the motion runs to its end through the filter. A stream has no known
-        path, so it stops clear of all bodies. If a stop in progress is as quick, it continues; returns None.
+        within the torque limits does that, the motion runs to its end through the filter. A stream has no
+        known path, so it stops clear of all bodies. If a stop in progress is as quick, it continues; returns
+        None.
         """
         cycle, wanted = self._cycle, math.inf if deceleration is None else deceleration
         if cycle.mode in {LineMode.STOPPING, LineMode.RUNNING_OUT} and wanted <= self._wanted:
@@ -59,7 +60,7 @@ class Stopper:
         return plan
 
     def brake(self, trajectory: Trajectory) -> None:
-        """Let the reference follow the arm while its brakes stop it; no other stop replaces this trajectory."""
+        """Let the reference follow the arm while brakes stop it; no other stop replaces this trajectory."""
         self._cycle.begin(trajectory, LineMode.STOPPING)
         self._wanted = math.inf  # like a request for the hardest stop
 

@@ -31,7 +31,7 @@ MAX_AHEAD = 4000  # largest number of ticks simulated to find the end of a motio
 
 
 class LineSimulation:
-    """A control line simulated ahead without its arm, by advancing its arguments; `line_filter` is None for a stop."""
+    """A line simulated ahead without arm, by advancing its arguments; `line_filter` is None for a stop."""
 
     def __init__(
         self, trajectory: Trajectory, line_filter: LineFilter | None, shaped: ShapedReference
@@ -58,7 +58,7 @@ class LineSimulation:
 
     @cached_property
     def last(self) -> int:
-        """Index of the last reference that moved, provided that the references come to rest; 0 if none moved."""
+        """Index of the last reference that moved, if the references come to rest; 0 if none moved."""
         return resting_after(np.array(self.references))
 
 
@@ -113,9 +113,9 @@ class StopPlanner:
         """Return the quickest stop along a motion's path that is certain to be permitted, else None.
 
         A permitted stop is never ahead of the motion and rests no later. This is certain if the stop brakes
-        harder, and with more jerk, than the motion ever will, or if the stop ends before the motion could end.
-        If the motion is about to rest, no stop qualifies. If `certain` is False, the motion lasts so long that
-        any stop within the torque limits is permitted.
+        harder, and with more jerk, than the motion ever will, or if the stop ends before the motion could
+        end. If the motion is about to rest, no stop qualifies. If `certain` is False, the motion lasts so
+        long that any stop within the torque limits is permitted.
         """
         speed, rise = forecast.path.forwards(state.qd), forecast.path.forwards(state.qdd)
         if (hardest := self._keeping(state, forecast, self.highest)) is None:
@@ -191,7 +191,7 @@ class StopPlanner:
     def by_joints(
         self, state: Target, wanted: float | None, clear: Callable[[JointStop], bool]
     ) -> JointStop | None:
-        """Return a collision-free stop of independent joints within torque limits; try `wanted` [rad/s^2] first."""
+        """Return a clear stop of independent joints within torque limits; try `wanted` [rad/s^2] first."""
         torque = StopTorque(self._dynamics, state, self._torque)
         stops = (self.stop(state, acceleration) for acceleration in self._ladder(wanted))
         within = (stop for stop in stops if (np.abs(stop.end) <= self._position).all())
@@ -226,13 +226,13 @@ class StopPlanner:
         return _first(filter(permitted, stops), lambda stop, rebound: torque.holds(stop, rebound=rebound))
 
     def _keeping(self, state: Target, forecast: BrakingForecast, acceleration: float) -> MotionLimits | None:
-        """Return limits of the path's parameter with which a stop keeps every joint's acceleration and jerk limit."""
+        """Return limits of a path's parameter with which a stop keeps joint acceleration and jerk limits."""
         speed, rise = abs(forecast.path.forwards(state.qd)), abs(forecast.path.forwards(state.qdd))
         fastest = speed + PERIOD * rise + rise * rise / self.jerk
         return forecast.path.keeping(MotionLimits(fastest, acceleration, self.jerk), fastest, state.q)
 
     def _ladder(self, wanted: float | None) -> Iterator[float]:
-        """Yield trial decelerations: from the requested one down to the gentlest, then harder ones, rising."""
+        """Yield trial decelerations: from the requested down to the gentlest, then harder ones, rising."""
         first = self.highest if wanted is None else min(max(wanted, GENTLEST_STOP), self.highest)
         down = first
         while down > GENTLEST_STOP:
@@ -248,7 +248,7 @@ class StopPlanner:
 
 
 def _first(stops: Iterable[S], holds: Callable[[S, bool], bool]) -> S | None:
-    """Return the first stop for which `holds(stop, True)`, else the first for which `holds(stop, False)`, else None."""
+    """Return the first stop with `holds(stop, True)`, else the first with `holds(stop, False)`, else None."""
     made = []
     for stop in stops:
         if holds(stop, True):

@@ -96,7 +96,7 @@ class Peripherals:
     # ------------------------------------------------------------------ for programs
 
     def choose(self, terminal: int, *, voltage: bool) -> None:
-        """Make an analogue input (0, 1) or output (2, 3) a voltage or a current; its stored number is not converted."""
+        """Set analogue input (0, 1) or output (2, 3) to voltage or current; its stored number is kept."""
         self._analog_types = self._analog_types & ~(1 << terminal) | voltage << terminal
         self.changed = True
 
@@ -189,7 +189,7 @@ class Peripherals:
         )
 
     def _payload_at(self, tick: int, after: Payload) -> Payload:
-        """Return the payload at a tick; until `after` is reached, all properties change linearly, as on UR robots."""
+        """Return the payload at a tick; up to `after`, all properties change linearly, as on UR robots."""
         if self.payload_change is None:
             return after
         before, ticks, last = self.payload_change

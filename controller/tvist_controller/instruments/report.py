@@ -111,7 +111,7 @@ class Sink:
 
 
 def true_modes(plant: Plant, joints: int) -> dict[str, list[float]]:
-    """Return at most `joints` true modes of the arm, which takes half a tick; empty lists if the plant has none."""
+    """Return up to `joints` true modes of the arm (takes half a tick); empty lists if the plant has none."""
     modes = plant.modes()
     return {name: [] if modes is None else getattr(modes, name)[:joints].tolist() for name in MODES}
 

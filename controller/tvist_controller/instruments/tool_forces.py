@@ -23,7 +23,7 @@ from tvist_protocol.values import Payload
 
 
 class ToolForces:
-    """External forces: measured by a force sensor at the flange if there is one, else estimated from drive torques."""
+    """External forces: measured by a force sensor at the flange if any, else estimated from drive torques."""
 
     def __init__(
         self,
@@ -49,7 +49,7 @@ class ToolForces:
         return list(found.tolist())
 
     def zero(self) -> None:
-        """Take the present force and torque at the tool as zero; those of a sensor are stored in its frame."""
+        """Take present force and torque at the tool as zero; those of a sensor are stored in its frame."""
         sample = self._latest().sample
         if sample.wrench is None:
             found = self._estimate()[:6]
@@ -67,8 +67,9 @@ class ToolForces:
     def estimated(self, sample: Sample, qd_before: Floats) -> Floats:
         """Return the force estimated from drive torques and measured motion, shape (3,) [N].
 
-        Links may lag behind their reference, in vibration or after late set-points. Unlike `felt`, this estimate
-        excludes the forces that accelerate such links. The rotors are assumed to follow the reference.
+        Links may lag behind their reference, in vibration or after late set-points. Unlike `felt`, this
+        estimate excludes the forces that accelerate such links. The rotors are assumed to follow the
+        reference.
         """
         measured = sample.measured
         motion = np.array([measured.q, measured.qd, (measured.qd - qd_before) / PERIOD])
@@ -105,10 +106,11 @@ class ToolForces:
             self._peripherals.zero_wrench(None)
 
     def unexplained(self, sample: Sample, wrench: Floats, *, zeroed: bool) -> Floats:
-        """Return the force of a sensor's wrench minus weight and inertia force of the payload, shape (3,) [N].
+        """Return the force of a sensor's wrench minus weight and inertia force of the payload, (3,) [N].
 
-        The payload's acceleration is that of the flange's accelerometer, which includes bending of links. If a plant
-        has no accelerometer (zeros), only the weight is subtracted. `zeroed`: the zero was taken with this sensor.
+        The payload's acceleration is that of the flange's accelerometer, which includes bending of links. If
+        a plant has no accelerometer (zeros), only the weight is subtracted. `zeroed`: the zero was taken with
+        this sensor.
         """
         measured, zero = sample.measured, self._peripherals.wrench_zero
         rotation, specific = self._rigid.arm.pose(measured.q)[0], measured.accelerometer

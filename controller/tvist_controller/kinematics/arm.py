@@ -129,7 +129,7 @@ class Arm:
         return out
 
     def inverse(self, q: Floats) -> tuple[Floats, Floats]:
-        """Return the Jacobian and its pseudo-inverse (n, 6), zero in directions lost at a singular posture."""
+        """Return the Jacobian and pseudo-inverse (n, 6), zero in directions lost at a singular posture."""
         jacobian, inverse = self.jacobian(q), np.empty((len(q), 6))
         pseudo_inverse(jacobian, inverse)
         return jacobian, inverse
@@ -137,7 +137,7 @@ class Arm:
     def near(
         self, goal: tuple[Floats, Floats], q: Floats, inverse: Floats | None = None, steps: int = 12
     ) -> tuple[Floats, Floats]:
-        """Return joint positions near q for a tool pose, and the remaining error; for `inverse` see `newton`."""
+        """Return joint positions near q for a tool pose, and remaining error; for `inverse` see `newton`."""
         rotation, position = map(
             np.ascontiguousarray, goal
         )  # same memory layout, so that the kernel is compiled only once
@@ -183,8 +183,9 @@ class InverseDynamics(Arm):
     """The arm with its declared payload.
 
     Torque is linear in a body's ten inertial parameters (mass, first moment, inertia about the joint), so a
-    new payload is phased in by a ramp between two sets of parameters. The torque then has no step, and all sets in
-    between are physically possible, since possible parameters form a convex set (Wensing, Kim and Slotine, 2018).
+    new payload is phased in by a ramp between two sets of parameters. The torque then has no step, and all
+    sets in between are physically possible, since possible parameters form a convex set (Wensing, Kim and
+    Slotine, 2018).
     """
 
     def __init__(self, description: RobotDescription, payload: Payload) -> None:
@@ -219,7 +220,7 @@ class InverseDynamics(Arm):
 
     @property
     def bodies(self) -> tuple[Floats, ...]:
-        """Inertial parameters (10,) of the last link: both sets during a payload change, else the present one."""
+        """Inertial parameters (10,) of the last link: both sets in a payload change, else the present one."""
         return (self._before, self._after) if self.changing else (self._after,)
 
     def believe(self, bodies: tuple[Floats, ...]) -> None:
@@ -234,7 +235,7 @@ class InverseDynamics(Arm):
         self._load(self._after)
 
     def effort(self, q: Floats, qd: Floats, qdd: Floats) -> Floats:
-        """Return the largest |τ| over all `bodies`, since any of these may be the true one, shape (n,) [N m]."""
+        """Return the largest |τ| over all `bodies`, since any may be the true one, shape (n,) [N m]."""
         if self._ticks_left == 0:
             return np.abs(self.torque(q, qd, qdd))
         present, largest = self._present, np.zeros_like(q)

@@ -16,7 +16,7 @@ from tvist_plant.model import Floats
 
 FOUND, NO_SOLUTION, OUT_OF_RANGE = 0, 1, 2
 ON_CURVE = 4
-"""Added to FOUND etc. if a joint is free and a curve of postures was searched, which takes many times longer."""
+"""Added to FOUND etc. if a joint is free and a curve of postures was searched, taking many times longer."""
 
 SAMPLES = 96  # values of a free angle at which postures are computed before the nearest are refined
 SPREAD = (53, 59)  # steps of the second and third free angle; any two angles then fill a square evenly
@@ -26,7 +26,7 @@ OUTSIDE = 1e6  # Penalty on the squared distance of a posture outside a joint's 
 
 @compiled
 def represent(arm: Floats, near: Floats, q: Floats) -> tuple[float, bool]:
-    """Bring q nearest to `near` by whole turns; return the squared distance [rad^2] and whether q is in range."""
+    """Bring q nearest to `near` by whole turns; return squared distance [rad^2] and whether q is in range."""
     square, inside = 0.0, True
     for i in range(len(q)):
         q[i] = representation(q[i], near[i], arm[i, 4])
@@ -89,7 +89,7 @@ def _sample_curves(
 def _start_from_near(
     chain: Floats, rotation: Floats, position: Floats, near: Floats, on_curve: bool, row: Floats
 ) -> None:
-    """Find the posture next to `near` by search: rounding near singularities shifts the results of `postures`."""
+    """Find the posture next to `near` by search: rounding near singularities shifts results of `postures`."""
     posture = near.copy()
     if descend(chain, rotation, position, near, 0.0, 30, posture) <= ACCURACY:
         if on_curve:
@@ -145,8 +145,9 @@ def search(
 ) -> int:
     """Find postures of any arm by least squares from `near` and other starts; return the nearest's index.
 
-    `found` has two rows per start: the solution, and the posture nearest to `near` after moving from the solution
-    at constant pose. Rows without result begin with NaN. Return -1 if no posture is within the joints' ranges.
+    `found` has two rows per start: the solution, and the posture nearest to `near` after moving from the
+    solution at constant pose. Rows without result begin with NaN. Return -1 if no posture is within the
+    joints' ranges.
     """
     best, least = -1, math.inf
     for start in range(len(starts) + 1):
@@ -225,7 +226,7 @@ class InverseKinematics:
         raise self._error(found[np.argmin(np.linalg.norm(found - near, axis=1))] if len(found) else None)
 
     def _error(self, q: Floats | None) -> InverseKinematicsError:
-        """Return the error: no posture reaches the pose (q is None), or a joint would be outside its range."""
+        """Return the error: no posture reaches the pose (q is None), or a joint would be out of range."""
         if q is None:
             return InverseKinematicsError("no joint positions reach this pose")
         joint = int(np.argmax(np.abs(q) - self._limits))

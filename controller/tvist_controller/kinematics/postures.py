@@ -9,9 +9,9 @@ Axis 1 turns a plane in which upper arm and forearm move; its fixed distance fro
 In the plane the triangle of upper arm and forearm has two forms, and the wrist two postures, q₅ and -q₅: up to eight in
 all. All angles come from atan2, so rounding errors of the pose are not amplified, even near singularities.
 
-If axes coincide, one joint is free and the postures form a curve; if two are free, a surface. The parameters are
-q₁ if the wrist centre is on axis 1; the direction of frame 4 in the plane (UR, axes 4 and 6 parallel) or q₄ (spherical
-wrist) if sin q₅ = 0; q₂ if the wrist is on axis 2.
+If axes coincide, one joint is free and the postures form a curve; if two are free, a surface. The parameters
+are q₁ if the wrist centre is on axis 1; the direction of frame 4 in the plane (UR, axes 4 and 6 parallel) or
+q₄ (spherical wrist) if sin q₅ = 0; q₂ if the wrist is on axis 2.
 """
 
 import math
@@ -87,7 +87,7 @@ def _form(dh: Floats) -> float:
 
 @inlined
 def representation(angle: float, near: float, limit: float) -> float:
-    """Add whole turns to an angle: nearest to `near` within ± limit or, if no value is within, nearest to zero."""
+    """Add whole turns to an angle: nearest to `near` within ± limit or, if none is within, nearest to 0."""
     turn = 2.0 * math.pi
     value = angle + turn * math.floor((near - angle) / turn + 0.5)
     if abs(value) <= limit:
@@ -102,7 +102,7 @@ def representation(angle: float, near: float, limit: float) -> float:
 
 @compiled
 def freedom_at(length: float) -> int:
-    """Return whether an angle is DEFINITE, LOOSE or FREE, from the sine or length that determines the angle."""
+    """Return whether an angle is DEFINITE, LOOSE or FREE, from the sine or length that determines it."""
     if length < AT_BORDER:
         return FREE
     return LOOSE if length < AMPLIFIED else DEFINITE

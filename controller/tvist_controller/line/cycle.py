@@ -24,7 +24,7 @@ T = TypeVar("T", bound=Trajectory)
 
 
 class ControlCycle:
-    """The control line: trajectory generator, filter, differentiator, inverse dynamics, joint controllers, plant.
+    """Control line: trajectory generator, filter, differentiator, inverse dynamics, joint controllers, plant.
 
     Raise ValueError if the plant cannot start at q, or its measurement has the wrong shape.
     """
@@ -152,8 +152,8 @@ class ControlCycle:
     def use(self, tvist: Filter, elastic: ElasticFeedForward | None = None) -> None:
         """Change the filter: at once if at rest, otherwise within the limits of the motion.
 
-        While an earlier change is in progress, the new filter waits; only the latest waiting filter is kept. If
-        `elastic` is None, the paper's feed-forward is used.
+        While an earlier change is in progress, the new filter waits; only the latest waiting filter is kept.
+        If `elastic` is None, the paper's feed-forward is used.
         """
         self.drives.wanted = elastic
         if self.mode.at_rest:  # both kinds of feed-forward are equal at rest: no fading
@@ -201,7 +201,7 @@ class ControlCycle:
 
     @property
     def stands_still(self) -> bool:
-        """Whether the shaped reference rests at a reference that stands still: the motion is over or paused."""
+        """Whether the shaped reference rests at a still reference: the motion is over or paused."""
         sample = self.sample
         return (
             self.trajectory.standing
@@ -228,8 +228,9 @@ class ControlCycle:
     ) -> Sample:
         """Place the arm at rest in static equilibrium, perhaps with another payload, and restart the whole line.
 
-        An arm that cannot be placed stays where it is; if its position is unknown, raise ValueError before any change.
-        If the arm does not answer, pass its last measurements as `measured`; the line starts there.
+        An arm that cannot be placed stays where it is; if its position is unknown, raise ValueError before
+        any change. If the arm does not answer, pass its last measurements as `measured`; the line starts
+        there.
         """
         plant = self.plant
         if measured is None and not isinstance(plant, SimulatedArm):

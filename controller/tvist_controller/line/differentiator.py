@@ -33,7 +33,7 @@ def rests_at(reference: Floats, target: Target) -> bool:
 
 
 def central_differences(references: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return positions, velocities and accelerations of references (k + 2, n), equal to those of `Differentiator`.
+    """Return positions, velocities and accelerations of references (k + 2, n), equal to `Differentiator`'s.
 
     The first and last reference have no result, so each result has shape (k, n).
     """
@@ -100,7 +100,7 @@ class Differentiator:
 
     @property
     def newest(self) -> Target:
-        """State at the newest reference. A motion that continues from this state starts with the same acceleration."""
+        """State at the newest reference. A motion continued from here starts with the same acceleration."""
         return self._state(*self.window)
 
     def after(self, q: Floats) -> Target:
@@ -135,7 +135,7 @@ class ShapedReference:
         """State of the samples; without a path, of the joints."""
 
     def take(self, x: Floats, x_star: Floats) -> Floats:
-        """Take samples before and after the filter (without filter, one object); return unshaped joint positions."""
+        """Take samples before and after the filter (without: one object); return unshaped joint positions."""
         q, q_star, posture_of = x, x_star, self.posture_of
         if posture_of is not None:
             q = posture_of(x)

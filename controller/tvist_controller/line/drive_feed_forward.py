@@ -16,8 +16,9 @@ FADE = 150  # duration of the transition in motion [ticks]
 class DriveFeedForward:
     """The paper's feed-forward, or elastic feed-forward while a shaper uses that.
 
-    Commands of the two kinds belong to different ticks and contain different shares of wind-up, so in motion one
-    kind fades into the other; at rest they are equal. For `compensate_sag` and `positions` see `joint_rows`.
+    Commands of the two kinds belong to different ticks and contain different shares of wind-up, so in motion
+    one kind fades into the other; at rest they are equal. For `compensate_sag` and `positions` see
+    `joint_rows`.
     """
 
     def __init__(
@@ -51,7 +52,7 @@ class DriveFeedForward:
             self.rows[LAW : LAW + len(self.law)] = self.law
 
     def rest(self) -> None:
-        """If no motor leads its joint, complete a transition at once: both kinds of feed-forward are then equal."""
+        """If no motor leads its joint, complete a transition at once: both feed-forwards are then equal."""
         self._rely_on_law()
         if self._elastic is self.wanted and self._share == self._full:
             return
@@ -76,8 +77,9 @@ class DriveFeedForward:
     ) -> DriveCommand:
         """Return the drive command for a target.
 
-        `may_begin`, `may_go_on`: the reference is smooth enough to begin or continue elastic feed-forward. A stop is
-        smooth enough to continue it. An unshaped guided motion may jump in acceleration, which motors cannot lead.
+        `may_begin`, `may_go_on`: the reference is smooth enough to begin or continue elastic feed-forward. A
+        stop is smooth enough to continue it. An unshaped guided motion may jump in acceleration, which motors
+        cannot lead.
         """
         if self._elastic is not None or self.wanted is not None:
             self._fade(may_begin if self._share == 0 else may_go_on)

@@ -93,7 +93,7 @@ def parts(memory: Floats) -> Lead:
 
 @compiled_for_ticks
 def move_back(lead: Lead, moved: Floats, back: Floats) -> None:
-    """Compute the joint turns that move the flange by `moved`: J_jᵀ (J_j J_jᵀ + λ² E)⁻¹ moved; overwrite `moved`."""
+    """Compute joint turns moving the flange by `moved`: J_jᵀ (J_j J_jᵀ + λ² E)⁻¹ moved; overwrite `moved`."""
     n = lead.joints.shape[0]
     square = np.zeros((3, 3))
     for row in range(3):
@@ -214,7 +214,7 @@ def follow(
     room: Floats,  # largest acceleration of each joint's lead, shape (n,) [rad/s^2]
     period: float,
 ) -> bool:
-    """Advance the actual lead; after a limitation it returns critically damped. Return whether it was limited now."""
+    """Advance the actual lead; once limited, it returns critically damped. Return whether limited now."""
     limited = False
     for j in range(led.shape[1]):
         now, before = led[0, j], led[1, j]

@@ -32,13 +32,13 @@ def friction_at(law: Floats, j: int, speed: float) -> float:
 
 @compiled_for_ticks
 def stiction_at(law: Floats, j: int, d: float, period: float, speed: float, load: float) -> float:
-    """Return a motor's stiction [N m] at the end of a period, from `d` at its start, by the plant's equation."""
+    """Return a motor's stiction [N m] at a period's end, from `d` at its start, by the plant's equation."""
     return stiction_after(d, period * speed, speed, load, law[5, j], law[6, j], law[7, j], law[8, j])
 
 
 @compiled_for_ticks
 def sticks(law: Floats, j: int) -> bool:
-    """Return whether a law has stiction. If not, the last stiction stays, since a torque step would shake the arm."""
+    """Return whether a law has stiction. If not, old stiction stays: a torque step would shake the arm."""
     return bool(law[5, j] > 0.0 or law[6, j] > 0.0)
 
 
@@ -79,7 +79,7 @@ def command_drives(
 
 
 def joint_rows(description: RobotDescription, *, compensate_sag: bool, positions: bool) -> Floats:
-    """Return each joint's parameters in rows `ROTOR` etc., shape (19, n); `positions` leaves out wind-up and sag."""
+    """Return joint parameters in rows `ROTOR` etc., shape (19, n); `positions` leaves out wind-up and sag."""
     drives = description.drives
     friction, stiffness = np.array(drives.coulomb_friction), np.array(drives.gear_stiffness)
     rows = np.zeros((ROWS, description.joints))

@@ -46,7 +46,7 @@ class LineFilter:
         return self.tvist.peak if fade is None else max(self.tvist.peak, fade.old.peak, fade.new.peak)
 
     def reduced_limits(self, limits: MotionLimits | None = None) -> MotionLimits:
-        """Return limits for the reference with which the shaped reference keeps the arm's limits and the given ones."""
+        """Return reference limits with which the shaped reference keeps the arm's and the given limits."""
         arm, (faster, harder) = self._arm, (1.0 + more for more in self.tvist.surplus)
         limits = arm if limits is None else limits
         return MotionLimits(

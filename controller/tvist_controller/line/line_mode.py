@@ -1,4 +1,4 @@
-"""Modes of the control line as a table (active parts, permitted next modes), and the guard that some modes need."""
+"""Table of the control line's modes (active parts, permitted next modes), and the guard some modes need."""
 
 from enum import Enum
 from typing import NamedTuple, Protocol

@@ -1,4 +1,4 @@
-"""Whole motions at once, block by block. No block depends on the arm, so results equal `ControlCycle`'s to the bit."""
+"""Whole motions, block by block. No block depends on the arm, so results equal `ControlCycle`'s bitwise."""
 
 from dataclasses import dataclass
 

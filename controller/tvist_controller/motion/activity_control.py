@@ -82,7 +82,7 @@ class MotionControl:
         return self.streams.stream is not None
 
     def snapshot(self, filter_now: FilterState, script: Script | None, time: float | None) -> PlanningState:
-        """Return the state for plans from rest or, if `time` [s] is given, for an extension of the motion after it."""
+        """Return the state for plans from rest or, with `time` [s], for extending the motion after it."""
         cycle = self.cycle
         tvist = cycle.tvist
         now = PlanningState(
@@ -120,7 +120,7 @@ class MotionControl:
         return self.motions.begin(planned)
 
     def pause(self) -> None:
-        """Pause the motion on its path, unless the motion is about to end; raise RefusalError if none runs."""
+        """Pause the motion on its path, unless it is about to end; raise RefusalError if none runs."""
         self.go("pause")
         if (move := self.motions.move) is not None:
             move.hold()
@@ -167,7 +167,7 @@ class MotionControl:
         self.activity = self.check(trigger)
 
     def follow(self, period: float, limits: MotionLimits, now: float) -> None:
-        """Start to follow set-points; raise RefusalError if busy, or if `limits` exceed the reduced velocity limit."""
+        """Start to follow set-points; RefusalError if busy, or `limits` exceed the reduced velocity limit."""
         target = self.check("servo_start")
         if (most := self.motions.slowest) is not None and limits.velocity > most:
             must = f"at most {most:.3g} rad/s while safety_mode is REDUCED"
@@ -218,7 +218,7 @@ class MotionControl:
         kind: EventKind | None = None,
         category: int = 2,
     ) -> None:
-        """If the trigger has a transition now, carry it out and stop motion; report the stop by an event of `kind`."""
+        """If the trigger has a transition now, make it and stop motion; report this by an event of `kind`."""
         if (target := after(self.activity, trigger)) is None:
             return
         self.activity = target
@@ -239,7 +239,7 @@ class MotionControl:
         kind: EventKind | None = None,
         category: int = 2,
     ) -> None:
-        """Report a stop and the motion that it ends; `plan` is None if the line is at rest or already stopping."""
+        """Report a stop and the motion it ends; `plan` is None if the line is at rest or already stopping."""
         if kind is None and not self.motions.running and not self.streaming:
             return
         duration, way = (0.0, 0.0) if self.cycle.mode.at_rest else self.ahead.until_rest(plan)
@@ -260,7 +260,7 @@ class MotionControl:
             self.interrupt(silence)
 
     def step(self, wrench: Floats | None = None) -> Sample:
-        """Compute one tick of the line; see `ControlCycle.step`. After a PlantError, call `SafetyControl.recover`."""
+        """Compute one tick, see `ControlCycle.step`. After a PlantError, call `SafetyControl.recover`."""
         if self.power is not None:
             self.power.follow(self.robot_mode)
         sample = self.cycle.step(wrench)

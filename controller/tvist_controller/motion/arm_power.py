@@ -41,7 +41,7 @@ class ArmPower:
             return Condition(ready=False, fault=str(error))
 
     def follow(self, mode: RobotMode) -> None:
-        """Switch power and brakes after a mode change; power stays off while the arm's own controller stops the arm."""
+        """Switch power and brakes by mode; power stays off while the arm's own controller stops the arm."""
         if self.halted is not None:
             mode = RobotMode.POWER_OFF
         if mode is self._told:

@@ -78,7 +78,7 @@ class ContactWatch:
 
 
 class ExternalSensor:
-    """A sensor that replaces the arm's own while in use and not silent; in lockstep it never counts as silent."""
+    """A sensor replacing the arm's own while in use and not silent; in lockstep it never counts as silent."""
 
     def __init__(self, *, timeouts: bool) -> None:
         self._most = round(SILENT / PERIOD) if timeouts else np.inf
@@ -116,7 +116,7 @@ class ExternalSensor:
 
 
 class ForceControl(Monitor):
-    """Starts, ends and monitors force mode and freedrive; without `timeouts`, the sensor never counts as silent."""
+    """Starts, ends and monitors force mode and freedrive; without `timeouts`, no sensor counts as silent."""
 
     def __init__(self, guidance: Guidance, forces: ToolForces, *, timeouts: bool) -> None:
         self._guidance, self._forces = guidance, forces
@@ -144,7 +144,8 @@ class ForceControl(Monitor):
         """Start or change force control with trigger `force_mode` or `freedrive`; return the motion's number.
 
         A running guided motion continues in the other axes. `feature` is the task's frame; `kind`, 1 to 3, is
-        explained in `frame_of`. Raise RefusalError if the present activity or motion does not allow force control.
+        explained in `frame_of`. Raise RefusalError if the present activity or motion does not allow force
+        control.
         """
         if self._cycle.plant.supervised:
             raise wrong_mode(
@@ -217,7 +218,7 @@ class ForceControl(Monitor):
         return found
 
     def look(self, sample: Sample) -> MonitorFinding | None:
-        """Detect excessive force, deviation in an axis that is not compliant, and a change of the force's source."""
+        """Detect excessive force, deviation in a non-compliant axis, and a change of the force's source."""
         # Without sensor and compliance there is nothing to monitor: sleep.
         leads = isinstance(self._cycle.trajectory, Compliant)
         if sample.wrench is None and self._contact is None and self._source == DRIVES and not leads:
@@ -259,7 +260,7 @@ class ForceControl(Monitor):
         return DRIVES if sample.wrench is None else "the arm's force sensor"
 
     def _follow_source(self, source: str) -> MonitorFinding | None:
-        """If the source of the force changes, forget the zero, which was the old source's, and end force control."""
+        """If the source of the force changes, forget the zero (the old source's) and end force control."""
         if source == self._source:
             return None
         self._source, self._contact = source, None

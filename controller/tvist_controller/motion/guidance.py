@@ -44,7 +44,7 @@ class Guidance:
         arm.near((turned(rotation, turn(rotation, rotation)), position), q)
 
     def servo(self, q: Floats, lookahead: float, gain: float, *, shaped: bool) -> int:
-        """Follow a posture, see `ServoFollower`; return the motion's number. Raise RefusalError as `check` does."""
+        """Follow a posture, see `ServoFollower`; return the motion's number; RefusalError as in `check`."""
         self.check("servo_j", shaped=shaped)
         servo = self._present(ServoFollower, shaped) or ServoFollower(
             self._start(shaped), self._most(shaped), self.reach, self.torque
@@ -53,7 +53,7 @@ class Guidance:
         return self.follow("servo_j", servo, shaped=shaped)
 
     def move_joints(self, qd: Floats, acceleration: float, *, shaped: bool) -> int:
-        """Approach joint velocities, see `Speed`; return the motion's number. Raise RefusalError as `check` does."""
+        """Approach joint velocities, see `Speed`; return the motion's number; RefusalError as in `check`."""
         self.check("speed_j", shaped=shaped)
         if shaped:
             most = self._most(shaped).velocity
@@ -63,7 +63,7 @@ class Guidance:
     def move_tool(
         self, twist: Floats, acceleration: float, angular_acceleration: float, *, shaped: bool
     ) -> int:
-        """Approach a tool velocity, see `Speed`; return the motion's number. Raise RefusalError as `check` does."""
+        """Approach a tool velocity, see `Speed`; return the motion's number; RefusalError as in `check`."""
         self.check("speed_l", shaped=shaped)
         accelerations = (acceleration, angular_acceleration)
         return self._approach("speed_l", self.motion.tool, twist, accelerations, shaped=shaped)
@@ -90,7 +90,7 @@ class Guidance:
         self._halt(trigger, stop, stop.duration)
 
     def stop_tool(self, acceleration: float, angular_acceleration: float) -> None:
-        """Come to rest with a deceleration of the tool [m/s^2, rad/s^2]; a tool moved by `speed_l` stays straight."""
+        """Stop with a deceleration of the tool [m/s^2, rad/s^2]; a tool moved by `speed_l` stays straight."""
         cycle = self._cycle
         state, present, tool = cycle.newest, cycle.trajectory, self.motion.tool
         fastest, twist = float(np.abs(state.qd).max()), tool.jacobian(state.q) @ state.qd
@@ -114,7 +114,7 @@ class Guidance:
         return self._cycle.filter.reduced_limits(self.limits) if shaped else self.limits
 
     def check(self, trigger: str, *, shaped: bool = False) -> None:
-        """Raise RefusalError if a command is not allowed now, or wants shaping that could only begin at rest."""
+        """Raise RefusalError if a command is not allowed now, or wants shaping that must begin at rest."""
         self.motion.check(trigger)
         if shaped and self.motion.activity is not Activity.REST and not self._continues(shaped):
             raise invalid("shaped", "true", "false, since this motion does not begin at rest", code="busy")
@@ -171,7 +171,7 @@ class Guidance:
         return stop
 
     def slow_down(self) -> None:
-        """Until the next command, bring a motion with commanded velocity to rest; a commanded posture stays."""
+        """Until the next command, bring motion with commanded velocity to rest; a commanded posture stays."""
         if isinstance(present := self.guided, Speed):
             present.come_to_rest()
 

@@ -29,7 +29,7 @@ class Monitor(ABC):
     """Checks the signals of each tick afterwards; `SafetyControl` has a robot's list of monitors."""
 
     needs: ClassVar[Literal["nothing", "drives", "drives alone"]] = "nothing"
-    """When to run: every tick, only while the drives hold the arm, or only if in addition no motion is compliant."""
+    """When to run: every tick, only while the drives hold the arm, or only if also no motion is compliant."""
 
     awake = True  # false if the monitor may be skipped in ticks without a measured force
 
@@ -70,7 +70,7 @@ class TorqueOverload(Monitor):
 
 
 class ShaperMonitor(Monitor):
-    """Detects a failing shaper; warns once if the shaper misses its specification or its feed-forward is limited."""
+    """Detects a failing shaper; warns once if it misses its specification or its feed-forward is limited."""
 
     def __init__(self, cycle: ControlCycle) -> None:
         self._cycle = cycle

@@ -65,7 +65,7 @@ class RunningMove:
         self._cycle.tvist.aim(self._trajectory.path.end)
 
     def _rate(self, speed: float, slowest: float | None) -> float:
-        """Return the time rate [-], lowered if the motion was planned for a shaper with less delay, peak or surplus."""
+        """Return a time rate [-], lower for motions planned for a shaper with less delay, peak or surplus."""
         tvist = self._cycle.tvist
         room = min(_fitting(self._window, tvist.delay), _fitting(self._peak, tvist.peak))
         if tvist.surplus != self._surplus:
@@ -77,7 +77,7 @@ class RunningMove:
 
     @property
     def progress(self) -> tuple[int, float] | None:
-        """Number of the present part, from 0, and length covered on it [m]; None for a straight line in joint space."""
+        """Number of the present part, from 0, and length covered on it [m]; None for a joint-space line."""
         if self._trajectory.path.posture_of is None:
             return None
         return self._parts - 1 - len(self.coming), float(self._cycle.along.newest.q[0])
@@ -178,7 +178,7 @@ class Motions:
             self._emit("warning", id=self._started, code=code, why=why)
 
     def guide(self, trajectory: Guided) -> int:
-        """Start a guided motion and return its number; if it replaces a running motion, it keeps that number."""
+        """Start a guided motion and return its number; if it replaces a running one, it keeps that number."""
         trajectory.pace(self.wanted_speed, self.slowest)
         if self._running is None:
             return self._begin(trajectory)
@@ -192,7 +192,7 @@ class Motions:
         return self._started
 
     def go_on(self) -> bool:
-        """After a part of the running motion has come to rest, start the next part; return False without one."""
+        """After a part of the running motion has come to rest, start the next; return False without one."""
         move = self.move
         if move is None or not move.coming:
             return False

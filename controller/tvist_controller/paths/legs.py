@@ -147,7 +147,7 @@ def _meeting(leg: Leg, blend: float, before: Floats, behind: Floats) -> BlendJun
 
 
 def _between(one: Floats, other: Floats) -> Floats:
-    """Return a curvature between two: their mean, limited by the smaller; 0 if they bend in opposite directions."""
+    """Return a curvature between two: their mean, limited by the smaller; 0 if they bend opposite ways."""
     if one @ other <= 0.0:
         return np.zeros_like(one)
     mean = 0.5 * (one + other)

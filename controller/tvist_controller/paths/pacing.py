@@ -96,7 +96,7 @@ def going_on(
 
 
 def _excess(law: RetimedLaw, moments: Floats, curve: SplineCurve, limits: JointLimits) -> float:
-    """Return the largest ratio, at some moments, of the speed to the speed that would keep joint limits [-]."""
+    """Return the largest ratio, at some moments, of speed to the speed that would keep joint limits [-]."""
     velocity, acceleration = shares(law, moments, curve, limits)
     return max(float(velocity.max()), float(np.sqrt(acceleration.max())))
 
@@ -130,7 +130,7 @@ class PathLimits(NamedTuple):
     third: Floats  # bound of |d³q/ds³| of any joint, shape (c,) [rad/m^3]
 
     def then(self, first: int, last: int, run: Run, curve: SplineCurve) -> "PathLimits":
-        """Return the limits of the part between the edges `first` and `last`, followed by a run, on a curve."""
+        """Return the limits of the part between edges `first` and `last`, followed by a run, on a curve."""
         further = ground_of(run, curve, float(self.places[last]))
         places = np.concatenate((self.places[first : last + 1], further.places[1:]))
         pairs = zip(self[1:], further[1:], strict=True)
@@ -180,7 +180,7 @@ def ground_of(run: Run, curve: SplineCurve, start: float = 0.0) -> PathLimits:
 
 
 def _tool(piece: Piece, places: Floats) -> tuple[Floats, Floats]:
-    """Return the tool's speed and second derivative per unit of the parameter in each cell; 1 and 0 on legs."""
+    """Return the tool's speed and second derivative per unit of parameter in each cell; 1 and 0 on legs."""
     count = len(places) - 1
     if piece.bent is None:
         return np.ones(count), np.zeros(count)
@@ -196,7 +196,7 @@ def _joints(curve: SplineCurve, places: Floats) -> tuple[Floats, Floats]:
 
 
 def _looks(places: Floats) -> Floats:
-    """Return the places at which limits are sampled: both ends and the middle of each cell, shape (2 c + 1,)."""
+    """Return the places where limits are sampled: both ends and the middle of each cell, shape (2 c + 1,)."""
     looks = np.empty(2 * len(places) - 1)
     looks[::2], looks[1::2] = places, 0.5 * (places[:-1] + places[1:])
     return looks
@@ -208,7 +208,7 @@ def _largest(values: Floats) -> Floats:
 
 
 def timed(pacing: LegSpeed, length: float) -> LegSpeed:
-    """Return a leg's speed limits; for a duration, those of a trapezoid whose two ramps each take a third of it."""
+    """Return a leg's speed limits; for a duration, those of a trapezoid whose two ramps take a third each."""
     if pacing.duration is None:
         return pacing
     duration = max(pacing.duration, BRIEFEST)

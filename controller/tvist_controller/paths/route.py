@@ -67,7 +67,7 @@ class Route(NamedTuple):
 
 
 def route_of(legs: Sequence[Leg], tracker: Tracker, start: Branch | None = None) -> Route:
-    """Divide a path into runs at its stops, from `start` (default: the first leg's); raise WayError if impossible."""
+    """Divide a path into runs at stops, from `start` (default: first leg's); raise WayError if impossible."""
     route, last = Route([Run()], [], []), len(legs) - 1
     meets = meetings(legs)
     here = start
@@ -109,7 +109,7 @@ def _cut_at(
     route: Route,
     tracker: Tracker,
 ) -> _Cut | None:
-    """Return the blend after a leg; None without one. If a requested blend is impossible, record the reason."""
+    """Return the blend after a leg, or None. If a requested blend is impossible, record the reason."""
     leg = legs[number]
     if leg.blend == 0.0 or number + 1 == len(legs):
         return None
@@ -139,7 +139,7 @@ def length_of(run: Run) -> float:
 
 
 def _from(q: Floats, cut: _Cut, tracker: Tracker) -> _Cut:
-    """Let a tool blend start at the actual posture q, which on a redundant arm may differ from the planned one."""
+    """Let a tool blend start at actual posture q, which on redundant arms may differ from the planned one."""
     piece = cut.piece
     if cut.curve is None or np.abs(piece.knots.q[0] - q).max() <= SAME:
         return cut
@@ -204,7 +204,7 @@ def _blend(
     q: Floats,
     tracker: Tracker,
 ) -> tuple[Piece, ToolCurve | None]:
-    """Return a blend that replaces `lengths` of two legs, and the tool's curve if any; q is the present posture."""
+    """Return a blend replacing `lengths` of two legs, and the tool curve if any; q is the present posture."""
     pacing, (before, after) = leg.pacing.meeting(then.pacing), lengths
     start = leg.way.length - before
     if isinstance(leg.way, JointWay) or isinstance(then.way, JointWay):
@@ -226,7 +226,7 @@ def _blend(
 
 
 def _rounding(leg: Leg, start: ToolState, end: ToolState, *, drawn_out: bool) -> float:
-    """Return a blend's parameter length relative to the replaced lengths, for least curvature of its polynomial.
+    """Return a blend's parameter length relative to replaced lengths, for least curvature of its polynomial.
 
     Fitted to corners of 20° to 170°: the largest curvature is 1.1 to 1.2 times that of an arc. A blend
     extended to meet another has the length of an arc.

@@ -43,7 +43,7 @@ class ToolWay(ToolCurve):
 
     @abstractmethod
     def within(self, radius: float) -> float:
-        """Return the length, from either end, within the radius [m]; may be longer than the curve, or infinite."""
+        """Return the length, from either end, within the radius [m]; may exceed the curve or be infinite."""
 
 
 class ToolLine(ToolWay):
@@ -71,8 +71,8 @@ class ToolLine(ToolWay):
 class ToolArc(ToolWay):
     """Arc of a circle from one pose through a point to another pose.
 
-    The tool turns with the tangent, ignoring the end orientation, or steadily to the end orientation the shortest way.
-    Raise ValueError if points coincide or are collinear.
+    The tool turns with the tangent, ignoring the end orientation, or steadily to the end orientation the
+    shortest way. Raise ValueError if points coincide or are collinear.
     """
 
     def __init__(self, start: Placement, via: Floats, end: Placement, *, tangent: bool) -> None:
@@ -188,7 +188,7 @@ def _at_corner(state: ToolState, corner: Floats) -> tuple[Floats, Floats, Floats
 
 
 def evenly(blend: ToolBlend) -> "ToolBlend | EvenBlend":
-    """Return the blend parametrized for constant tool speed; unchanged if the tool nearly stops within the blend."""
+    """Return the blend parametrized for constant tool speed; unchanged if the tool nearly stops within it."""
     speeds, _ = blend.shape(np.linspace(0.0, blend.length, PIECES + 1))
     ends = abs(float(speeds[0]) - 1.0) + abs(float(speeds[-1]) - 1.0)
     return blend if float(speeds.min()) < SLOWEST or ends > EVEN else EvenBlend(blend)

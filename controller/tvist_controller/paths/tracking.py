@@ -61,7 +61,7 @@ class Tracker:
         return None if second is None else (first, second)
 
     def follow(self, curve: ToolCurve, q: Floats) -> Knots:
-        """Return the joints' motion along a tool path; raise WayError if the path is singular or out of reach."""
+        """Return the joints' motion along a tool path; raise WayError if it is singular or out of reach."""
         pieces = 1 if curve.length < SHORT else max(int(np.ceil(curve.length / SPACING)), 2)
         knots, step = [self._knot(curve, 0.0, q)], curve.length / pieces
         # One by one, so that a long path out of reach fails after few knots.

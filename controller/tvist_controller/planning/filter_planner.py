@@ -71,8 +71,8 @@ class FilterPlanner:
     ) -> FilterChoice:
         """Return a filter by name for a number of modes to suppress; `where` is the field of the name.
 
-        The filter uses `source`, or the arm's modal estimator if it needs more modes than the source has. Raise
-        RefusalError if there is no such filter.
+        The filter uses `source`, or the arm's modal estimator if it needs more modes than the source has.
+        Raise RefusalError if there is no such filter.
         """
         wanted = wanted_modes(name, modes, where, self._known)
         if wanted > source.most and self._modal is not None:
@@ -90,7 +90,7 @@ class FilterPlanner:
         return self._with_feed_forward(source, tvist, where)
 
     def with_payload(self, payload: Payload, present: FilterState) -> Filter | None:
-        """Return the present filter with modes for another payload; None if modes do not depend on payload."""
+        """Return the present filter with another payload's modes; None if modes do not depend on payload."""
         return self._again(present, present.source, payload, "mass") if present.source.knows_payload else None
 
     def like(self, present: FilterState) -> Filter:
@@ -246,8 +246,9 @@ def surplus_of(
 
     While the mean delay D shrinks, velocity is 1 - Ḋ times the reference's, and acceleration contains (1 -
     Ḋ)² ẍ - ẋ D̈. Modes of a smooth estimator change quickest if all joints move at full speed in the worst
-    direction. Modes of an abrupt one change at most as `TvistFilter` allows. Negative weights add at most what
-    the acceleration limit permits within the filter's length. There is one of the `estimators` per payload.
+    direction. Modes of an abrupt one change at most as `TvistFilter` allows. Negative weights add at most
+    what the acceleration limit permits within the filter's length. There is one of the `estimators` per
+    payload.
     """
     limits, peak = arm_limits(description), tvist.peak
     reach = np.minimum(description.limits.position, np.pi)

@@ -1,4 +1,4 @@
-"""Planning of motions as quick as requested, or as limits permit; near a limit, by shaping them in advance."""
+"""Planning of motions as quick as requested, or as limits permit; near limits, by shaping them in advance."""
 
 import itertools
 import math
@@ -85,8 +85,9 @@ class Fitter:
     ) -> Fitted:
         """Plan a motion; while it exceeds a limit, plan it again more slowly.
 
-        Near a limit, the motion is shaped in advance by the filter from `tvist`. With None, to save time, the filter's
-        `surplus` is kept free instead. `limits` are the requested ones; None if something else sets the speed.
+        Near a limit, the motion is shaped in advance by the filter from `tvist`. With None, to save time, the
+        filter's `surplus` is kept free instead. `limits` are the requested ones; None if something else sets
+        the speed.
         """
         asked, need, slower = make(AS_ASKED), None, AS_ASKED
         motion = asked
@@ -98,7 +99,7 @@ class Fitter:
             by = found.slower
             need = found if need is None else min(need, found, key=lambda each: each.slower.rate)
             if number >= SPLIT:
-                # A shaper's duration is constant, so a slower motion may use more of a limit than the last one.
+                # A shaper's duration is constant, so a slower motion may use more of a limit than the last.
                 most = 1.0 - min(HASTE * 2.0 ** (number - TRIES), 0.5) if number >= TRIES else 1.0
                 rate = min(by.rate, most)
                 by = Slower(rate, rate**2)
@@ -118,7 +119,7 @@ class Fitter:
     def _need(
         self, motion: PlannedMotion, now: PlanningState, tvist: Callable[[], Filter] | None
     ) -> Need | None:
-        """Return how much slower a motion must be: by a bound with the filter's surplus or, if too much, as shaped."""
+        """Return how much to slow a motion: by a bound with the filter surplus or, if too much, as shaped."""
         q, qd, qdd = _states(motion)
         faster, harder = (1.0 + more for more in now.surplus)
         qd, qdd = faster * qd, harder * qdd
@@ -205,9 +206,9 @@ def keeping_motion(
 ) -> PlannedMotion:
     """Return the quickest motion whose shaped reference keeps the limits.
 
-    If a filter's weights vary with posture, it adds to the acceleration: within the limits `EASY`, at most the
-    share `excess`. Beyond `EASY`, the motion is shaped in advance, and planned again with less acceleration if
-    necessary. Raise ValueError if there is no such motion.
+    If a filter's weights vary with posture, it adds to the acceleration: within the limits `EASY`, at most
+    the share `excess`. Beyond `EASY`, the motion is shaped in advance, and planned again with less
+    acceleration if necessary. Raise ValueError if there is no such motion.
     """
     easy = tvist.excess == 0.0 or not (
         limits.velocity > EASY.velocity or limits.acceleration > EASY.acceleration or limits.jerk > EASY.jerk

@@ -56,7 +56,7 @@ class MovePlanner(Fitter):
         self._collisions = CollisionModel(setup.description, body(setup.payload))
 
     def move(self, command: MoveJ, now: PlanningState, *, at_once: bool = False) -> PlannedMove:
-        """Plan a motion from rest, or raise RefusalError; with `at_once`, save time by not shaping it in advance."""
+        """Plan a motion from rest or raise RefusalError; with `at_once`, save time: no shaping in advance."""
         path, duration = JointLine(now.q, np.array(command.q, dtype=float)), command.duration
         limits, agility = MotionLimits(command.velocity, command.acceleration, command.jerk), None
         if duration is not None:
@@ -99,7 +99,7 @@ class MovePlanner(Fitter):
         )
 
     def _lasting(self, path: JointLine, duration: float, now: PlanningState) -> MotionLimits:
-        """Return limits with which a motion takes a duration [s], or the arm's limits if those make it longer."""
+        """Return limits with which a motion takes a duration [s], or the arm's if those make it longer."""
         limits = arm_limits(self._description)
         reduced = replace(limits, acceleration=limits.acceleration * (1.0 - now.excess))
         slower = min(quickest_motion(path, reduced).duration / duration, 1.0)

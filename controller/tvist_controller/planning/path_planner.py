@@ -60,7 +60,7 @@ class PathPlanner:
         self._reachable = reachable
 
     def plan(self, command: MoveL | MoveC | MovePath, now: PlanningState) -> PlannedMove | None:
-        """Plan a motion from rest, or an extension (None: too late for that); raise RefusalError if impossible."""
+        """Plan a motion from rest, or an extension (None: too late); raise RefusalError if impossible."""
         tracker = Tracker(self._description, now.tcp)
         legs = list(self._reachable.legs(command, tracker, now))
         count = len(command.segments) if isinstance(command, MovePath) else 1
@@ -132,7 +132,7 @@ class PathPlanner:
     def _check_clear(
         self, way: CheckedMotion, run: Run, part: tuple[float, float], now: PlanningState
     ) -> None:
-        """Refuse a path with a collision; `part` is where the run starts on the whole path, and the path's length."""
+        """Refuse a colliding path; `part`: where the run starts on the whole path, and the path's length."""
         if (found := self._moves.meeting(way, now)) is None:
             return
         share, meeting = found
@@ -210,7 +210,7 @@ class PathPlanner:
 
 
 def _told(fitted: Fitted, run: Run, start: float = 0.0) -> Limited | None:
-    """Return what slowed a motion down, and where; `start` is where the run starts on the motion's curve [m]."""
+    """Return what slowed a motion, and where; `start` is where the run starts on the motion's curve [m]."""
     told, q, path = fitted.limited, fitted.q, fitted.motion.path
     if told is None or q is None or not isinstance(path, SplineCurve) or not run[0].where:
         return told
@@ -257,7 +257,7 @@ def _course(
 
 
 def marks_of(runs: list[Run], segments: range, start: float = 0.0) -> tuple[tuple[int, float], ...]:
-    """Return where the blend at each segment's end begins, see `PlannedMove.marks`; `start` as in `_joined`."""
+    """Return where each segment's end blend begins, see `PlannedMove.marks`; `start` as in `_joined`."""
     marks = dict[int, tuple[int, float]]()
     for part, run in enumerate(runs):
         ends = ((0.0 if part else start) + np.cumsum([piece.knots.s[-1] for piece in run])).tolist()

@@ -55,7 +55,7 @@ class Reachable:
     def refusal(
         self, error: WayError, field: str, share: float, goal: Placement, tcp: Sequence[float]
     ) -> RefusalError:
-        """Return the refusal of a path that is possible up to a share of the way, 0 to 1; `field` is the command's."""
+        """Return the refusal of a path possible up to a share of the way, 0 to 1; `field`: the command's."""
         at = f"{field}: after {100.0 * share:.0f} % of the way, at {_shown(error.pose)}"
         for pose, where in ((goal, f"{field} {_shown(goal)}"), (error.pose, at)):
             flange = pose @ placement(tcp).inverse

@@ -1,4 +1,4 @@
-"""Messages that name the limit that makes a motion slower than requested; none if only the way is too short."""
+"""Messages that name the limit making a motion slower than requested; none if only the way is too short."""
 
 from typing import NamedTuple
 
@@ -15,7 +15,7 @@ from tvist_protocol.replies import Code
 REACHED = 0.9
 """Fraction of the speed that counts as reached; a peak between two acceleration ramps stays a little lower [-]."""
 BLUNTED = 3.0
-"""On a way too short for the requested speed: tolerated ratio of its peak without to that with jerk limit [-]."""
+"""On a way too short for the requested speed: tolerated ratio of peak without to peak with jerk limit [-]."""
 DURATION_TOLERANCE = 1.01  # ratio of durations up to which a motion counts as on time [-]
 USED_UP = 0.95  # fraction of a limit above which it is responsible [-]
 SAMPLES = 65  # number of places of a curve at which the joints' permitted speed is computed
@@ -57,7 +57,7 @@ JERKS = Binding("limit_acceleration", "tool and joints stay within the limits of
 def slower_path(
     run: Run, curve: SplineCurve, law: RetimedLaw, limits: JointLimits, description: RobotDescription
 ) -> Limited | None:
-    """Return the limit that prevents a one-segment motion's speed or duration; None if only its way is too short."""
+    """Return the limit that prevents one segment's speed or duration; None if only its way is too short."""
     pacing, way = run[0].pacing, float(curve.end[0])
     if pacing.duration is not None:
         if law.duration <= DURATION_TOLERANCE * pacing.duration:

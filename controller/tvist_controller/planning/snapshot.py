@@ -46,7 +46,7 @@ class ExtendableMotion:
         return self.curve.posture(self.curve.end)
 
     def branch(self, until: float) -> tuple[ExtensionEdges, Branch] | None:
-        """Return cuts and point of the first possible change of the motion after a time [s]; None if too late."""
+        """Return cuts and point of the motion's first possible change after a time [s]; None if too late."""
         law, edges = self.law, self.law.edges
         moment = until * law.rate
         known = int(np.searchsorted(law.times, moment))

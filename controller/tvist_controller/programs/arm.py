@@ -1,4 +1,4 @@
-"""Motions of programs: one thread moves the arm at a time, moves are blended, motions may outlast their call."""
+"""Motions of programs: one thread moves the arm at a time, moves blend, motions may outlast their call."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -94,7 +94,7 @@ class ProgramArm:
         self._present()
 
     def _led(self, moves: BlendedMoves) -> bool:
-        """Return whether force control must carry out the moves, because another thread made the arm compliant."""
+        """Return whether force control must carry out the moves, as another thread made the arm compliant."""
         waits = moves.number is None and not moves.over
         return waits and self._access.guidance.compliant is not None
 
@@ -120,7 +120,7 @@ class ProgramArm:
             self._current.step()
 
     def then(self, effect: Callable[[], None]) -> None:
-        """Call `effect` at the start of the blend after this thread's last waiting move; now if no move waits."""
+        """Call `effect` at the start of the blend after the thread's last waiting move; now if none waits."""
         if (moves := self._present()) is None:
             effect()
         else:
@@ -147,7 +147,7 @@ class ProgramArm:
     # ------------------------------------------------------------------ guided motions
 
     def guide(self, start: Callable[[bool], int | None], wait: Iterator[None]) -> Turns:
-        """Start or change a guided motion by `start(shaped)` and run `wait`; the motion continues after the return."""
+        """Start or change a guided motion by `start(shaped)`, run `wait`; the motion continues afterwards."""
         yield from self.finish()
         with self._moving():
             yield from self.regain()
@@ -162,7 +162,7 @@ class ProgramArm:
         return (activity.moving or activity.protective) and after(activity, command) is None
 
     def regain(self) -> Turns:
-        """Wait for the end of a stop and, if that ended force mode, for its restart by a thread; else raise Fault."""
+        """Wait for a stop's end and, if that ended force mode, for its restart by a thread; else Fault."""
         left = RESTART_TICKS
         while (stopping := self._stopping("speed_j")) or (self.compliance_lost and left > 0):
             left -= not (stopping or self._asked)
@@ -278,7 +278,7 @@ class ProgramArm:
         return self._guided is not None
 
     def settle(self) -> None:
-        """Stop a motion whose thread has ended, unless another thread took over; called at the end of each turn."""
+        """Stop a motion whose thread has ended, unless another took over; called at the end of each turn."""
         self._rate_limit.planning = max(self._rate_limit.planning - 1, 0)
         moves = self._current
         if moves is not None and not (moves.over or self._lives(moves.owner)):
@@ -325,7 +325,7 @@ class ProgramArm:
 
     @contextmanager
     def _moving(self) -> Iterator[None]:
-        """Keep other threads from moving the arm. If the thread is killed meanwhile, its motion counts as abandoned."""
+        """Keep other threads from moving the arm. If the thread is killed, its motion counts as abandoned."""
         self._check_alone()
         self._inside = self._thread()
         self._abandoned = False

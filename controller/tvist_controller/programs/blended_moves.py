@@ -63,9 +63,9 @@ class RateLimit:
 class BlendedMoves:
     """The blended moves of one thread, and the motion along them.
 
-    The motion starts when the last move is known, or when the most moves that are planned together wait. `step`
-    continues it every tick while the thread adds moves. Each plan ends at rest, so the arm stops where the next
-    move comes too late. `rest` stops other motion and waits until a motion may start.
+    The motion starts when the last move is known, or when the most moves that are planned together wait.
+    `step` continues it every tick while the thread adds moves. Each plan ends at rest, so the arm stops where
+    the next move comes too late. `rest` stops other motion and waits until a motion may start.
     """
 
     def __init__(
@@ -89,7 +89,7 @@ class BlendedMoves:
         self._extension: tuple[Callable[[], Plan], int, int] | None = None
         """Ordered plan of an extension, tick at which it applies, and number of moves."""
         self._final = self._refuses = False
-        """Whether the running motion cannot be extended; whether the reason is that a further move is impossible."""
+        """Whether the running motion cannot be extended; whether because a further move is impossible."""
         self._count = 0  # number of moves of the running motion
 
     # ------------------------------------------------------------------ for the program
@@ -114,12 +114,12 @@ class BlendedMoves:
         return self._steps is not None
 
     def hand_over(self) -> list[tuple[Segment, list[Effect]]]:
-        """End these moves; return the remaining ones with their effects, to be carried out by force control."""
+        """End these moves; return remaining ones with their effects, to be carried out by force control."""
         self.over = True
         return list(zip(self.legs, self._effects, strict=True))
 
     def stop(self) -> None:
-        """Record a protective stop. When the program resumes, moves up to the arm's place of rest count as passed."""
+        """Record a protective stop. On resumption, moves up to the arm's place of rest count as passed."""
         move = self._motion.motions.move
         self.outcome, self._stops_at = "protective_stop", None if move is None else move.stops_at
 
@@ -189,7 +189,7 @@ class BlendedMoves:
         self._count = len(legs)
 
     def _planned(self, legs: list[Segment]) -> Generator[None, None, Plan]:
-        """Plan moves: joint moves at once; lines, paths, and joint moves in debt a fixed time after the order."""
+        """Plan joint moves at once; lines, paths, and joint moves in debt a fixed time after the order."""
         plans, command = self._access.plans, self._command(legs)
         if isinstance(command, MoveJ) and self._rate_limit.debt < PAUSE:
             self._rate_limit.charge()

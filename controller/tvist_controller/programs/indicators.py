@@ -35,7 +35,7 @@ None for no change."""
 
 
 class Popups:
-    """The popup of one robot. Until it is closed or replaced, it belongs to the program that `owner` returned."""
+    """A robot's popup. Until closed or replaced, it belongs to the program that `owner` returned."""
 
     def __init__(self, emit: Emit, owner: Callable[[], object]) -> None:
         self._emit, self._owner = emit, owner
@@ -52,7 +52,7 @@ class Popups:
         return self._owners is not None
 
     def close(self, owner: object | None = None) -> None:
-        """Close the popup; with `owner`, a program that has ended, only if the popup belongs to that program."""
+        """Close the popup; with `owner`, a program that has ended, only if the popup is that program's."""
         if owner is None or self._owners is owner:
             self._owners = None
 
@@ -66,7 +66,7 @@ class RunstateOutputs:
         self._runs = False
 
     def choose(self, group: Group, place: int, what: int) -> None:
-        """Choose by UR's number what an output does in each state of the program; 0 leaves the output to programs."""
+        """Choose by UR's number what an output does in each state of the program; 0 leaves it to programs."""
         self._choices.pop((group, place), None)
         if what:
             self._choices[group, place] = what
@@ -113,7 +113,7 @@ class Watchdogs:
         self._tick = 0
 
     def watch(self, name: str, frequency: float, action: str) -> None:
-        """Watch that an RTDE input is written at `frequency` [Hz]; else `pause` or `stop`. `ignore` ends the watch."""
+        """Watch that an RTDE input is set at `frequency` [Hz]; else `pause` or `stop`. `ignore` ends this."""
         bank, place = _register(name)
         self._peripherals.changed = True
         if action == "ignore":

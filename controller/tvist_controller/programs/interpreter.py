@@ -22,8 +22,8 @@ WAITS, CLEAR = "interpreter_mode", "clear_interpreter"
 class StatementQueue:
     """The statements that clients have added to one robot's program.
 
-    If a program calls `interpreter_mode` anywhere, it accepts statements from its start on; these run while the
-    program waits in that function.
+    If a program calls `interpreter_mode` anywhere, it accepts statements from its start on; these run while
+    the program waits in that function.
     """
 
     def __init__(
@@ -143,7 +143,7 @@ class StatementQueue:
         return self._interpreted
 
     def _check_room(self, length: int, *, clears: bool) -> None:
-        """Refuse a statement that makes the program too large; including statements not yet cleared, twice as large."""
+        """Refuse a statement that makes the program too large; with uncleared statements, twice as large."""
         held = [characters for _, characters in self._lengths]
         added = [characters for number, characters in self._lengths if number > self._forgotten]
         full = len(held) >= HELD * MAX_STATEMENTS or sum(held) + length > HELD * MAX_SCRIPT

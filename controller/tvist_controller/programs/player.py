@@ -35,8 +35,9 @@ class _Running:
 class ProgramPlayer:
     """Runs a program and secondary ones with the rights of the client that played them.
 
-    Motions of programs have numbers and events like those of clients. A client may pause a motion; stopping it ends
-    the program. A protective stop pauses the program; after unlocking, playing resumes with the interrupted move.
+    Motions of programs have numbers and events like those of clients. A client may pause a motion; stopping
+    it ends the program. A protective stop pauses the program; after unlocking, playing resumes with the
+    interrupted move.
     """
 
     def __init__(self, access: Access, safety: SafetyControl) -> None:
@@ -137,7 +138,7 @@ class ProgramPlayer:
 
     @property
     def _held(self) -> bool:
-        """Whether the program must wait: it is paused, a safeguard stop is active, or the drives are not ready yet."""
+        """Whether the program must wait: paused, safeguard stop active, or drives not ready yet."""
         motion = self._motion
         unready = motion.robot_mode is RobotMode.RUNNING and not motion.ready
         return self.state != "PLAYING" or motion.safety.safeguard or unready

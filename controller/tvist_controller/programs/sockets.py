@@ -1,7 +1,8 @@
 """Sockets of programs: received data and waiting readers.
 
-The host has the network: it takes orders after the programs' turns and reports `SocketNews` before a tick. The
-journal contains the news, so that a replay gets the same bytes. A cell's gripper is simulated; it answers a tick later.
+The host has the network: it takes orders after the programs' turns and reports `SocketNews` before a tick.
+The journal contains the news, so that a replay gets the same bytes. A cell's gripper is simulated; it answers
+a tick later.
 """
 
 from collections.abc import Callable, Generator, Iterator, Sequence
@@ -87,7 +88,7 @@ class Waited(NamedTuple):
 
 
 class Expire(NamedTuple):
-    """Report `expired` once `seconds` of wall time have passed since the wait began; robot time has passed already."""
+    """Report `expired` after `seconds` of wall time since the wait began; robot time has passed already."""
 
     wait: int
     socket: int
@@ -219,9 +220,10 @@ class Sockets:
     ) -> Generator[None, None, T | None]:
         """Read from a socket what `take` finds; wait until that has arrived completely.
 
-        Incomplete data stays for the next call. A read fails on timeout or if the socket was closed before; it returns
-        None after at least a tick, so that loops let time pass. The timeout [s] is over when both robot and wall time
-        have passed; 0 or less means none. `meanwhile` is called before each further tick with the ticks waited.
+        Incomplete data stays for the next call. A read fails on timeout or if the socket was closed before;
+        it returns None after at least a tick, so that loops let time pass. The timeout [s] is over when both
+        robot and wall time have passed; 0 or less means none. `meanwhile` is called before each further tick
+        with the ticks waited.
         """
         if (socket := self._named.get((self._owner(), name))) is None:
             yield

@@ -79,7 +79,7 @@ class Watching(RemoteStatus):
         modes.now = int(RobotMode.DISCONNECTED), int(SafetyMode.UNDEFINED), int(RuntimeState.STOPPED)
 
     def look(self) -> int | None:
-        """Take the next report and return its tick; None without a report. `tell_cycle` then emits the changes."""
+        """Take the next report and return its tick; None without one. `tell_cycle` then emits the changes."""
         self._before = self._sight
         try:
             self._sight = self._plant.sight()
@@ -113,7 +113,7 @@ class Watching(RemoteStatus):
 
 
 class Supervision(RemoteStatus):
-    """Follows an arm that tvist moves through the manufacturer's controller; `motion` and `safety` are tvist's own."""
+    """Follows an arm tvist moves through the manufacturer's controller; `motion` and `safety` are tvist's."""
 
     def __init__(
         self,

@@ -124,7 +124,7 @@ def _motions(
 
 
 def _sensor_alone(recording: "Recording", *, json: bool) -> dict[str, Any]:
-    """Measure frequency and damping in a log without joint angles; return or print them as `_motions` does."""
+    """Measure frequency and damping in a log without joint angles; return or print them like `_motions`."""
     from tvist_lab.metrics.columns import number as cell
     from tvist_lab.metrics.sensor_alone import free_vibrations
 

@@ -151,7 +151,7 @@ class SocketFunctions(Family):
         timeout: float,
         missing: float,
     ) -> Generator[None, None, Array]:
-        """Read `count` values; return a list of their number and the values. If they are missing, the number is 0."""
+        """Read `count` values; return a list of their number and the values. If missing, the number is 0."""
         found = yield from self._read(name, lambda got: take(got, count), timeout)
         return a_list((0,) + (missing,) * count if found is None else (count, *found))
 
@@ -159,7 +159,7 @@ class SocketFunctions(Family):
         return self._parts.sockets.read(name, take, timeout, self._go_on)
 
     def _go_on(self, waited: int) -> None:
-        """If data have not come, start moves that wait for a further move; that may still be blended in motion."""
+        """If no data came, start moves that wait for a further move; that may still be blended in motion."""
         if waited >= MORE:
             self._arm.begin()
 
@@ -189,7 +189,7 @@ def _line(received: bytes) -> tuple[bytes, int] | None:
 
 
 def _between(received: bytes, prefix: bytes, suffix: bytes) -> tuple[bytes, int] | None:
-    """Parse the text between a prefix and a suffix (without suffix, all received text); drop the text before it."""
+    """Parse the text between a prefix and a suffix (without suffix, all text); drop the text before it."""
     start = received.find(prefix)
     if start < 0:
         return None
