@@ -17,8 +17,8 @@ def residual_over_error(shaper: Shaper, zeta: float, errors: Floats) -> Floats:
 def settling_time(shaper: Shaper, f_d: float, zeta: float, error: float) -> float:
     """Return the time from the unshaped stop until the mode stays below 5 % of its unshaped vibration [s].
 
-    This is the shaper's delay plus the time in which the remaining vibration decays, infinite without damping;
-    the worse sign of `error` counts.
+    This is the shaper's delay plus the time in which the remaining vibration decays, infinite without
+    damping; the worse sign of `error` counts.
     """
     times = []
     for side in (-error, error):

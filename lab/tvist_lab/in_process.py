@@ -24,8 +24,8 @@ REST_S = 1.0  # time for the shaper's delay and the vibration after a motion [s]
 def free_setup(config: ServeConfig | None = None, **changes: object) -> Setup:
     """Return a setup with a free clock and published truth, by default of the default robot.
 
-    If `config` is given, its choice of `truth` is kept, but a clock `realtime` becomes `free`. `changes` are fields
-    of `ServeConfig`. Raises StartError if a change names no field or has an invalid value.
+    If `config` is given, its choice of `truth` is kept, but a clock `realtime` becomes `free`. `changes` are
+    fields of `ServeConfig`. Raises StartError if a change names no field or has an invalid value.
     """
     if config is None:
         return from_mapping({"clock": "free", "truth": True, **changes}, "setup").setup()

@@ -30,8 +30,8 @@ from tvist_protocol.stream import Event, State, Truth
 from tvist_server.recording.recorder import Recorder
 
 ALWAYS, PER_STATE = 30_000, 100
-"""A recording may have as many ticks as one minute plus this number for each of its states: ticks without states
-also take time in a replay."""
+"""A recording may have as many ticks as one minute plus this number for each of its states: ticks without
+states also take time in a replay."""
 
 
 class ReplayError(TvistError):
@@ -52,8 +52,8 @@ class Replay:
 def replay(setup: Setup, journal: Sequence[Entry], states: Sequence[State]) -> Replay:
     """Give a new controller the same inputs at the same ticks, and compare its states with the recorded ones.
 
-    `states` start at the recorded controller's first tick. Raises ValueError if the setup is invalid, or if its
-    plant, such as a real arm, determines when ticks happen.
+    `states` start at the recorded controller's first tick. Raises ValueError if the setup is invalid, or if
+    its plant, such as a real arm, determines when ticks happen.
     """
     controller, presence, done, names = Controller(setup), Presence(), Replay(), known_fields(states)
     check_unpaced(controller.cycle.plant)

@@ -88,7 +88,7 @@ class InlineExecutor(Executor):
 
 @contextmanager
 def processes(number: int | None = None) -> Iterator[Executor]:
-    """Start `number` processes on this machine, by default one per core; they end with the block in any case."""
+    """Start `number` processes on this machine, by default one per core; they always end with the block."""
     with _group_signals_blocked():  # the process by which multiprocessing cleans up must outlive this one
         multiprocessing.resource_tracker.ensure_running()
     others = set(multiprocessing.active_children())

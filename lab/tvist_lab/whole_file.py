@@ -36,8 +36,8 @@ def whole_file(path: Path) -> Iterator[IO[bytes]]:
 def write_whole(path: Path, content: bytes) -> None:
     """Write a file completely, or leave it unchanged.
 
-    A link, a device such as /dev/stdout, and a file that cannot be replaced, such as a mount point, are written
-    in place.
+    A link, a device such as /dev/stdout, and a file that cannot be replaced, such as a mount point, are
+    written in place.
     """
     if path.is_symlink() or (path.exists() and (not path.is_file() or path.stat().st_nlink > 1)):
         path.write_bytes(content)

@@ -40,8 +40,8 @@ WORKSPACE = Region(
 def workspace(description: RobotDescription, margin: float = 0.0) -> Region:
     """Return the workspace of an arm, at a margin from the limits of its joints [rad].
 
-    An arm with fewer joints than `WORKSPACE` may be mounted in another way, so its workspace is the whole range of
-    its joints, at most half a turn either way.
+    An arm with fewer joints than `WORKSPACE` may be mounted in another way, so its workspace is the whole
+    range of its joints, at most half a turn either way.
     """
     limits, sides = description.limits.position, len(WORKSPACE.low)
     whole = WORKSPACE if len(limits) >= sides else Region(low=(-np.pi,) * sides, high=(np.pi,) * sides)

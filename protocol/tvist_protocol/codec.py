@@ -25,7 +25,7 @@ from tvist_protocol.values import Name
 Message = Command | Setpoint | Reply | State | Event | Truth | Telemetry | Io | Info
 
 MAX_BYTES = 256 * 1024
-"""Largest message that is decoded [bytes]; steps of 1000 set-points (85 kB) and calibrations are the longest."""
+"""Largest decoded message [bytes]; steps of 1000 set-points (85 kB) and calibrations are the longest."""
 
 _Some = TypeVar("_Some")
 _SomeMessage = TypeVar("_SomeMessage", bound=Message)
@@ -118,7 +118,7 @@ def refusal(error: ProtocolError) -> Refused:
 
 
 def decode_envelope(data: bytes) -> Envelope:
-    """Return type and token of a message without validating other fields; ProtocolError if they are invalid."""
+    """Return type and token of a message without checking other fields; ProtocolError if they are invalid."""
     return _decoded(_ENVELOPE, data, {})
 
 

@@ -1,4 +1,4 @@
-"""Converts msgspec's errors to code, field, message and limit. To name values, short messages are decoded again."""
+"""Converts msgspec errors to code, field, message and limit; decodes short messages again to name values."""
 
 import math
 import re
@@ -44,7 +44,7 @@ class _Fault:
 
 
 def explain_refusal(error: msgspec.ValidationError, data: bytes, types: Types) -> ProtocolError:
-    """Return the error of an invalid message; if it is longer than `EXPLAINED_BYTES`, the error names no values."""
+    """Return an invalid message's error; if it is longer than `EXPLAINED_BYTES`, the error names no value."""
     message = _untyped(data, Any if len(data) <= EXPLAINED_BYTES else _Head)
     name = message.get("type") if isinstance(message, dict) else None
     return _explain(error, message, types.get(name) if isinstance(name, str) else None, "the message", types)

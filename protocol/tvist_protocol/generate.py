@@ -29,7 +29,7 @@ def generated(folder: Path) -> dict[Path, bytes]:
 
 
 def stray(folder: Path, files: Iterable[Path]) -> set[Path]:
-    """Return files in folders of generated files that are not generated any more, such as a removed message's."""
+    """Return files in folders of generated files that are no longer generated, such as removed messages'."""
     return {*(folder / "schemas").iterdir(), *(folder / "fixtures" / "v1").glob("*.msgpack")} - set(files)
 
 

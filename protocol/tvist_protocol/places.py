@@ -46,7 +46,7 @@ class Place:
 
     @property
     def struct(self) -> type[msgspec.Struct] | None:
-        """The struct expected there, in a union the one of the value's `type` or else the first; None: no struct."""
+        """The expected struct, in a union that of the value's `type` or else the first; None: no struct."""
         found = list(_structs(self.kind))
         tag = self.value.get("type") if isinstance(self.value, dict) else None
         return next((kind for kind in found if kind.__struct_config__.tag == tag), next(iter(found), None))

@@ -4,8 +4,8 @@ A recording is an MCAP file with channels `state`, `event`, `truth`, `io` and `j
 keys. Its times are ticks of 2 ms as nanoseconds since tick 0, never the wall clock. Metadata `tvist` has the format,
 `info`, and `start` (how the server was started); metadata `tvist.end` the messages dropped on each channel.
 
-Viewers require one plain type per field, without null. A null field is therefore omitted, and null in a list or
-field means that a number is not finite, which JSON cannot express.
+Viewers require one plain type per field, without null. A null field is therefore omitted, and null in a list
+or field means that a number is not finite, which JSON cannot express.
 """
 
 import math
@@ -52,7 +52,7 @@ _ENCODER = msgspec.json.Encoder()
 
 
 def segment_name(name: str, run: int, number: int | None) -> str:
-    """Return a segment's name, `run-2-part0001.mcap` for `run.mcap`; if `number` is None, a pattern of the run's."""
+    """Return a segment's name, `run-2-part0001.mcap` for `run.mcap`; without `number`, the run's pattern."""
     path = PurePath(name)
     if number is None:
         return f"{escape(path.stem)}-{run}-part*{escape(path.suffix)}"
@@ -81,7 +81,7 @@ def topics(robot: str) -> dict[type[msgspec.Struct], str]:
 
 
 def to_json(message: Recorded) -> bytes:
-    """Encode a message; finite floats are restored bit for bit. TypeError if a value has a type unknown to JSON."""
+    """Encode a message; finite floats are restored bit for bit. TypeError if JSON lacks a value's type."""
     content: dict[str, Any] = {"type": tag(type(message))}
     for name in message.__struct_fields__:
         value = getattr(message, name)
@@ -104,7 +104,7 @@ class JsonReader(Generic[_Some]):
         self._before = _ENCODER.encode(self._absent)[:-1] + b"," if self._absent else b""
 
     def read(self, data: bytes) -> _Some:
-        """Decode a message; numbers that were not finite become NaN. ProtocolError if the message has another type."""
+        """Decode a message; non-finite numbers become NaN. ProtocolError if the message has another type."""
         try:
             try:
                 # Add null for omitted fields; if a key occurs twice, msgspec keeps the later one, from the data.

@@ -49,7 +49,7 @@ def field_docs(described: type) -> dict[str, str]:
 
 @cache
 def _classes(module: str) -> dict[str, ast.ClassDef]:
-    """Return the classes of a module, parsed once, since `inspect.getsource` would parse the module for each class."""
+    """Return a module's classes, parsed once, since `inspect.getsource` would parse it for each class."""
     tree = ast.parse(inspect.getsource(sys.modules[module]))
     return {part.name: part for part in ast.walk(tree) if isinstance(part, ast.ClassDef)}
 

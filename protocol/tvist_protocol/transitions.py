@@ -1,4 +1,4 @@
-"""Activities of a robot and a table of the transitions between them; commands and other events trigger them."""
+"""Activities of a robot and a table of transitions between them; commands and other events trigger them."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -44,7 +44,7 @@ class Activity(StrEnum):
     """Whether the activity is a protective stop."""
 
     def safety_mode(self, *, reduced: bool) -> SafetyMode:
-        """Return the safety mode as numbered by RTDE; a more serious mode of the safety system takes precedence."""
+        """Return the safety mode as numbered by RTDE; a more serious mode of the safety system prevails."""
         if self.protective:
             return SafetyMode.PROTECTIVE_STOP
         return SafetyMode.REDUCED if reduced else SafetyMode.NORMAL
@@ -165,7 +165,7 @@ def after(activity: Activity, trigger: str) -> Activity | None:
 
 
 def diagram(states: type[StrEnum]) -> str:
-    """Return the rows of these states as a Mermaid diagram; one that all moving states share is drawn once."""
+    """Return these states' rows as a Mermaid diagram; one that all moving states share is drawn once."""
     arrows: dict[tuple[str, str], list[str]] = {}
     for row in TRANSITIONS:
         sources = [source for source in row.sources if isinstance(source, states)]

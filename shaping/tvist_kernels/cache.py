@@ -124,7 +124,7 @@ class _Content(CompileResultCacheImpl):
 
 
 def held(some: "Iterable[KernelCache]") -> "dict[KernelCache, list[Path]]":
-    """Return the files with machine code for this processor, by kernel; kernels without such files are left out."""
+    """Return the files with machine code for this processor, by kernel; kernels without any are left out."""
     machines, listed, real = _machines(cpu_target.target_context), cache(_listed), cache(_real)
 
     def there(kernel: KernelCache, folder: Path) -> list[Path]:
@@ -143,7 +143,7 @@ def held(some: "Iterable[KernelCache]") -> "dict[KernelCache, list[Path]]":
 
 
 def load_all(some: "Iterable[KernelCache]") -> bool:
-    """Load the machine code of kernels, which takes milliseconds, before their first calls; False if damaged."""
+    """Load machine code of kernels, which takes milliseconds, before their first calls; False if damaged."""
     loaded = [kernel.load_file(file) for kernel, files in held(some).items() for file in files]
     return all(loaded)
 

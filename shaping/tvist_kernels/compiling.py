@@ -7,7 +7,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def compiled(function: F, *, nogil: bool = False) -> F:
-    """Compile a function at its first call; keep its machine code on disk, and the Python function as `.py_func`.
+    """Compile a function at its first call; keep machine code on disk, and the Python function as `.py_func`.
 
     All functions that it calls must be compiled, too. With `nogil`, other threads run while it runs.
     """

@@ -13,11 +13,12 @@ class DistrustError(OSError):
 
 
 def real_folder(folder: Path) -> Path:
-    """Resolve a folder, which need not exist yet; check that nobody else can put a file into it, now or later.
+    """Resolve a folder, which need not exist yet; check that nobody else can put files in it, now or later.
 
-    Folders are checked from the root down. If nobody else can write in a folder, nobody else can replace the folders
-    below it after the check. In a sticky folder, such as /tmp, everybody can write, but nobody can replace folders of
-    others. Raise DistrustError if others can write in a folder, and OSError if a folder cannot be inspected.
+    Folders are checked from the root down. If nobody else can write in a folder, nobody else can replace the
+    folders below it after the check. In a sticky folder, such as /tmp, everybody can write, but nobody can
+    replace folders of others. Raise DistrustError if others can write in a folder, and OSError if a folder
+    cannot be inspected.
     """
     real = Path(os.path.realpath(folder))
     if sys.platform == "win32":  # folders have no such owners and modes there
@@ -57,8 +58,8 @@ def check_file(file: Path) -> None:
 def make_folder(folder: Path) -> Path:
     """Make a folder and its parents so that only this user can write there; return its resolved path.
 
-    Raise DistrustError if somebody else can write in the folder or in the place where it would be made, and OSError if
-    it cannot be made.
+    Raise DistrustError if somebody else can write in the folder or in the place where it would be made, and
+    OSError if it cannot be made.
     """
     real = real_folder(folder)
     for missing in reversed([one for one in (real, *real.parents) if not one.exists()]):

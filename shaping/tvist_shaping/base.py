@@ -42,7 +42,7 @@ class Filter(Forked, ABC):
             [-]. The generator of the reference can stay below its limit by this share.
         surplus: Largest shares by which the shaped velocity and acceleration exceed those of a reference at the arm's
             limits [-]. Only the caller, who knows the arm, can set them; see `mean_delay_of`.
-        clipped: Whether at the last tick a delay exceeded the buffer, or a mode exceeded the estimator's bounds.
+        clipped: Whether at the last tick a delay exceeded the buffer, or a mode the estimator's bounds.
         feed_forward: Feed-forward that the drives need for the filter to work as designed.
         fault: Why the shaper's function failed in its last call; None if it did not. A filter cannot stop abruptly
             during a motion, so it continues with its last weights, and the caller should stop the motion.

@@ -147,7 +147,7 @@ class PayloadLearning:
         self._under_way.append((self._later(study), learnt))
 
     def _record(self, sample: Sample, present: Callable[[], FilterState]) -> _Motion | None:
-        """Record a tick with drives on; return the motion that ends in it, if any. A motion begins with `present()`."""
+        """Record a tick with drives on; return the motion it ends, if any. Motions begin with `present()`."""
         resting, done, motion = sample.mode.at_rest, None, self._motion
         if not resting and (motion is None or motion.stop):
             done, motion = motion, _Motion(present())
@@ -213,7 +213,7 @@ class Equations:
     joints: int  # number n of joints
 
     def solve(self, prior: Estimate) -> Estimate | None:
-        """Return mass and centre of mass, given a prior around `at`; None if pushed, or if a value is not finite."""
+        """Find mass and centre of mass from a prior around `at`; None if pushed, or a value is not finite."""
         if not (np.isfinite(self.rows).all() and np.isfinite(self.measured).all()):
             return None
         mass, per_kg = float(self.at[0]), self.rows[:, 0]
@@ -255,7 +255,7 @@ class PayloadEstimator:
         self._believed: Payload | None = None
 
     def study(self, motion: MotionRecord) -> PayloadLesson | None:
-        """Return the carried payload, if it certainly differs from the assumed one by more than `DEAD`, else None."""
+        """Return the payload, if it certainly differs from the assumed one by more than `DEAD`, else None."""
         believed = motion.beliefs.declared
         if not motion.whole or len(motion.moments) < MIN_BLOCKS * BLOCK:
             return None

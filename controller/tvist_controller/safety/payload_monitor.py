@@ -90,7 +90,7 @@ class PayloadMonitor(Monitor):
         self._correlate(signals, np.zeros_like(self._sums))  # loads compiled code, which takes many ticks
 
     def declare(self, payload: Payload, ticks: int, *, found: bool = False, told: bool = False) -> None:
-        """Set another payload and discard measurements; `found`: learnt by the robot; `told`: clients were warned."""
+        """Set another payload and drop measurements; `found`: learnt by the robot; `told`: clients warned."""
         self.payload = payload
         self._called = "assumed" if found else "declared"
         self._arm.chain[-2, BODY:] = self._arm.on_flange(Payload(mass=1.0, com=payload.com))

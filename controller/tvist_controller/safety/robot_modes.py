@@ -43,7 +43,7 @@ class RobotModes:
 
     @property
     def stop_reason(self) -> StopReason | None:
-        """The stop that blocks the robot or has switched its power off; None without one, or without its event."""
+        """The stop that blocks the robot or has cut its power; None without one, or without its event."""
         robot, safety, event = self._motion.robot_mode, self._motion.safety_mode, None
         if safety not in _MAY_MOVE:
             event = self.stops.get(safety)

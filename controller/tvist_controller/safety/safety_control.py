@@ -36,7 +36,7 @@ class SafetyControl:
         self._resumes_by_itself = False  # whether a motion paused by a safeguard resumes when it is released
 
     def reduce(self, *, reduced: bool) -> None:
-        """Begin or end reduced speed; stop a stream that may be too fast, since its client determines the speed."""
+        """Begin or end reduced speed; stop a stream that may be too fast, since its client sets the speed."""
         motion, system = self._motion, self._motion.safety
         if reduced == system.reduced:
             return
@@ -102,7 +102,7 @@ class SafetyControl:
         motion.go(trigger)
 
     def _hold(self) -> None:
-        """Before the drives hold the arm, start the line at its position; raise RefusalError if that is impossible."""
+        """Before the drives hold the arm, start the line at its position; RefusalError if impossible."""
         try:
             self._begin_where_it_stands()
         except ValueError as error:
@@ -113,7 +113,8 @@ class SafetyControl:
     def _begin_where_it_stands(self) -> None:
         """Start the line at the position of an arm that cannot be placed; raise ValueError if unknown.
 
-        Its position may differ from the line's: without power it may be moved or sink, and brakes stop it anywhere.
+        Its position may differ from the line's: without power it may be moved or sink, and brakes stop it
+        anywhere.
         """
         cycle = self._motion.cycle
         if not isinstance(cycle.plant, SimulatedArm):
@@ -175,7 +176,7 @@ class SafetyControl:
             monitor.restart()
 
     def watch_power(self, sample: Sample) -> None:
-        """Stop an arm that reports trouble. If the drives have just begun to hold the arm, restart the line there."""
+        """Stop an arm that reports trouble. If drives have just begun to hold it, restart the line there."""
         motion = self._motion
         if motion.power is not None:
             held = motion.power.halted is None
@@ -202,7 +203,7 @@ class SafetyControl:
     def recover(self, error: PlantError, seed: int) -> Sample:
         """Recover from a failed arm: place a simulated arm at rest at its reference, in a protective stop.
 
-        An arm that cannot be placed, or fails again at once, has no power until the safety system is restarted.
+        An arm that cannot be placed or fails again at once has no power until the safety system is restarted.
         """
         motion, cycle = self._motion, self._motion.cycle
         placed = isinstance(cycle.plant, SimulatedArm)

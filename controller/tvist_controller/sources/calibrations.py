@@ -96,7 +96,8 @@ def estimator_of(calibration: Calibration) -> Polynomial:
 def fits(calibration: Calibration, payload: Payload, estimator: str = "polynomial") -> bool:
     """Return whether a calibration is valid for a payload.
 
-    A modal model is valid for any payload; polynomials only within 2 % of their payload's mass and 10 mm of its centre.
+    A modal model is valid for any payload; polynomials only within 2 % of their payload's mass and 10 mm of
+    its centre.
     """
     if estimator == "modal" or calibration.polynomial is None:
         return True
@@ -129,7 +130,7 @@ def modal_estimator(
 def elastic_feed_forward(
     tvist: Filter, description: RobotDescription, calibration: Calibration
 ) -> ElasticFeedForward | None:
-    """Create the elastic feed-forward for a filter from a calibration's springs; None if the filter uses none."""
+    """Create a filter's elastic feed-forward from a calibration's springs; None if the filter uses none."""
     if tvist.feed_forward == "rigid":
         return None
     parameters = _modal(calibration, description).parameters
@@ -150,9 +151,9 @@ def known_friction(
 ) -> Floats | None:
     """Return friction to feed forward in full, see `LAWS`; None for a fraction of Coulomb friction.
 
-    This is the friction of the robot file, if that contains stiction, else the identified friction. Without shaping
-    (`tvist` None) and with the paper's filter, the robot file's is not used: the paper's controller fed only a fraction
-    of Coulomb friction forward, to which the tails of its Table 2 are due.
+    This is the friction of the robot file, if that contains stiction, else the identified friction. Without
+    shaping (`tvist` None) and with the paper's filter, the robot file's is not used: the paper's controller
+    fed only a fraction of Coulomb friction forward, to which the tails of its Table 2 are due.
     """
     plain = tvist is None or isinstance(tvist, TvistFilter)
     described = None if plain else described_friction(description)
@@ -162,7 +163,7 @@ def known_friction(
 
 
 def _modal(calibration: Calibration, description: RobotDescription) -> ModalModel:
-    """Return a calibration's modal model; raise EstimatorError if it is missing or belongs to another robot."""
+    """Return a calibration's modal model; EstimatorError if it is missing or belongs to another robot."""
     if calibration.modal is None:
         wanted = "a model that tvist identify makes; this calibration has polynomials alone"
         raise EstimatorError("modal", None, wanted)

@@ -34,7 +34,7 @@ def is_file(place: str) -> bool:
 
 
 def ends(failure: BaseException) -> bool:
-    """Return whether an exception was raised by a signal (a subclass of SystemExit) and must end the process."""
+    """Return whether an exception is raised by a signal (subclass of SystemExit) and must end the process."""
     return isinstance(failure, SystemExit) and type(failure) is not SystemExit
 
 

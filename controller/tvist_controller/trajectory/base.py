@@ -39,9 +39,9 @@ class CheckedMotion(NamedTuple):
 class Path(ABC):
     """Joint positions q(x) as a function of a parameter x.
 
-    Time laws, the TVIST filter and stops act on the parameter, so their results stay on the path. The parameter has
-    shape (m,) and goes straight from `start` to `end`, in radians for a straight line in joint space, in
-    metres for a tool path.
+    Time laws, the TVIST filter and stops act on the parameter, so their results stay on the path. The
+    parameter has shape (m,) and goes straight from `start` to `end`, in radians for a straight line in joint
+    space, in metres for a tool path.
     """
 
     posture_of: Posture | None
@@ -65,13 +65,13 @@ class Path(ABC):
     def paced(self, x: Floats, xd: Floats, xdd: Floats, acceleration: float) -> Floats:
         """Return velocities and accelerations that limit changes of the time rate, shape (2, k).
 
-        They are scaled so that `acceleration`, the parameter's limit [1/s^2], is the limit of every column. `xd`
-        [1/s] and `xdd` [1/s^2] are ẋ and ẍ at full rate, each of shape (m,).
+        They are scaled so that `acceleration`, the parameter's limit [1/s^2], is the limit of every column.
+        `xd` [1/s] and `xdd` [1/s^2] are ẋ and ẍ at full rate, each of shape (m,).
         """
 
     @abstractmethod
     def keeping(self, limits: MotionLimits, velocity: float, x: Floats) -> MotionLimits | None:
-        """Return limits of the parameter for a stop from x, (m,), at up to `velocity` [1/s]; None if there are none."""
+        """Return the parameter's limits, if any, for a stop from x, (m,), at up to `velocity` [1/s]."""
 
     @abstractmethod
     def way(self, start: Floats, end: Floats) -> CheckedMotion:
@@ -116,7 +116,7 @@ class JointLine(Path):
 
 @dataclass(frozen=True)
 class BrakingForecast:
-    """When and how hard a trajectory will brake, in terms of its path's parameter, as known without simulation."""
+    """When and how hard a trajectory will brake, in its path's parameter, as known without simulation."""
 
     path: Path  # path of the trajectory
     end: Floats  # parameter at its uninterrupted end, shape (m,) [rad]
@@ -149,8 +149,8 @@ class Trajectory(ABC):
     def adapt(self, reduced_limits: Callable[[MotionLimits | None], MotionLimits]) -> None:  # noqa: B027  most need not
         """Reduce the limits for a new filter; only references without a plan need this.
 
-        `reduced_limits(limits)` returns limits for the reference with which the shaped reference keeps `limits` (None:
-        no such limits) and the arm's limits.
+        `reduced_limits(limits)` returns limits for the reference with which the shaped reference keeps
+        `limits` (None: no such limits) and the arm's limits.
         """
 
     @property

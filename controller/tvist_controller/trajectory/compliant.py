@@ -1,4 +1,4 @@
-"""A reference that complies with forces at the tool in some axes; in the others, another reference moves the tool."""
+"""A reference that complies with forces at the tool in some axes; the other axes follow another reference."""
 
 import math
 from collections.abc import Callable
@@ -47,8 +47,8 @@ def compliant_velocity(task: ForceTask, velocity: Floats, felt: Floats) -> Float
     """Return the velocity of the frame's axes a tick later, shape (6,) [m/s, rad/s].
 
     A compliant axis is a virtual mass with damping, M v̇ = g (w + f) - D v, with wanted wrench w, measured
-    wrench f (6,) [N, N m] and gain g, integrated implicitly, so any damping is stable. In contact, D rises to at
-    least `contact_damping`. An axis that has become stiff loses its earlier compliant velocity gradually.
+    wrench f (6,) [N, N m] and gain g, integrated implicitly, so any damping is stable. In contact, D rises to
+    at least `contact_damping`. An axis that has become stiff loses its earlier compliant velocity gradually.
     """
     scale = np.repeat([1.0, LEVER * LEVER], 3)
     touched = np.minimum(np.abs(felt) / np.repeat([CONTACT, CONTACT * LEVER], 3), 1.0)
@@ -65,9 +65,9 @@ def compliant_velocity(task: ForceTask, velocity: Floats, felt: Floats) -> Float
 class Compliant(LimitedFollower):
     """Moves the tool by force control in compliant axes, and as an inner reference does in stiff axes.
 
-    A pose P is integrated from velocities along the task's axes: in compliant axes the force law's, in stiff axes that
-    of the inner reference's tool. The joints follow P by Newton's method and a `Limiter`. If joint limits or singular
-    postures prevent a compliant motion, it is removed from P, so that nothing is caught up later.
+    A pose P is integrated from velocities along the task's axes: in compliant axes the force law's, in stiff
+    axes the inner reference's. The joints follow P by Newton's method and a `Limiter`. If joint limits or
+    singular postures prevent a compliant motion, it is removed from P, so that nothing is caught up later.
     """
 
     finished = False  # a compliant motion ends by a command

@@ -16,8 +16,8 @@ LOOKAHEAD = (0.03, 0.2)  # range of the time constant [s]
 GAIN = (100.0, 2000.0)  # range of the gain [1/s^2]
 DAMPED = 3.0  # smallest gain times squared lag: damping 0.87, overshoot 0.4 % [-]
 DELAY = 1.5
-"""Ticks by which T exceeds the lookahead. Each posture is held for a tick, which adds half a tick. So `target_q`
-lags by the lookahead plus two ticks, one of which is the differentiator's."""
+"""Ticks by which T exceeds the lookahead. Each posture is held for a tick, which adds half a tick. So
+`target_q` lags by the lookahead plus two ticks, one of which is the differentiator's."""
 THERE = 1e-7  # distance, and change per tick, below which the posture is reached [rad]
 
 
@@ -51,7 +51,7 @@ class Guided(Trajectory):
 
 
 class LimitedFollower(Guided):
-    """Passes a client's signal through a `Limiter`. The client sets the timing; reduced mode limits only velocity."""
+    """Passes a signal, timed by its client, through a `Limiter`; reduced mode limits only velocity."""
 
     def __init__(
         self,

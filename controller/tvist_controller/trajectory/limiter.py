@@ -37,7 +37,7 @@ def judge(
     now: Floats,  # result: differences, shape (4, n)
     fits: Bools,  # result: which joints fit, shape (n,)
 ) -> int:
-    """Find the joints whose differences keep limits now and can later; return `FIT`, `FAR`, their sum, or 0."""
+    """Find joints whose differences keep limits now and can later; return `FIT`, `FAR`, their sum, or 0."""
     fastest = (1.0 + TOLERANCE) * velocity + ROUNDING
     hardest = (1.0 + TOLERANCE) * acceleration + 2.0 * ROUNDING
     harshest = (1.0 + TOLERANCE) * jerk + 4.0 * ROUNDING
@@ -178,7 +178,7 @@ class Limiter:
         return q, qd, qdd
 
     def _passed(self, q: Floats, now: Floats, bend_before: Floats | None = None) -> Floats:
-        """Return the state (3, n) of joints exactly on the signal, from the cubic through the last four positions."""
+        """Return state (3, n) of joints exactly on the signal, by a cubic through the last four positions."""
         h, limit, step, bend = PERIOD, self._limits.acceleration, now[STEP], now[BEND]
         change = bend - (self._now[BEND] if bend_before is None else bend_before)
         mean = bend / (h * h)
@@ -197,13 +197,13 @@ class Limiter:
         return meets
 
     def _accelerations(self) -> tuple[float, float]:
-        """Return the acceleration permitted now, and one with which a stop is certainly possible [rad/s^2]."""
+        """Return the acceleration permitted now and one with which a stop is certainly possible [rad/s^2]."""
         limit = self._limits.acceleration
         room = math.inf if self._torque is None else self._torque.acceleration(*self.state[:2])
         return min(limit, room), min(limit, STOPS * room)
 
     def _stoppable(self, state: Floats, limit: float) -> Bools:
-        """Return the joints that could still stop in range at `limit` [rad/s^2] if they started two ticks later."""
+        """Return which joints could still stop in range at `limit` [rad/s^2] if they started in two ticks."""
         (q, qd, qdd), jerk = state, self._limits.jerk
         sign = np.sign(qd)
         speed, rise = np.abs(qd), sign * qdd
@@ -255,7 +255,7 @@ class Limiter:
         return state, fits
 
     def _catch_up(self, q: Floats, qd: Floats, limit: float, fits: Bools) -> Floats:
-        """Return the state (3, n) a tick later while joints catch up with a signal of constant acceleration."""
+        """Return the state (3, n) a tick later as joints catch up with a signal of constant acceleration."""
         request, limits, h = self._catch_request, self._limits, PERIOD
         fastest = (1.0 - self.ADVANTAGE) * limits.velocity
         present = self.state

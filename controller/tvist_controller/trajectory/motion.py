@@ -49,7 +49,7 @@ class TimeScaling:
         """Advance by one tick towards a target rate [-]; return the time that passes on the path [s].
 
         `curve` has q' [rad/s] and q'' [rad/s^2], each (2, n), at the present point and just ahead; the change
-        of rate must keep the limits at both points, since the motion passes from one to the other in the tick.
+        of rate must keep the limits at both points, since the motion passes from one to the other in a tick.
         """
         rooms = [self._room(qd, qdd) for qd, qdd in curve]
         # ruckig requires limits on both sides of zero, so leave a little room in both directions.
@@ -131,8 +131,8 @@ class DoubleS:
 class PlannedMotion(Trajectory):
     """A planned motion from rest to rest.
 
-    Samples are the path's parameter; on a straight line in joint space, these are joint positions. Rate changes
-    may use `agility`, or at least the limits of the law, which may itself be slow.
+    Samples are the path's parameter; on a straight line in joint space, these are joint positions. Rate
+    changes may use `agility`, or at least the limits of the law, which may itself be slow.
     """
 
     path: Path
@@ -155,7 +155,7 @@ class PlannedMotion(Trajectory):
         self._since, self._ticks = 0.0, 0
 
     def time_at(self, share: float) -> float:
-        """Return the time [s], at full speed, at which the motion has covered a fraction of the way, 0 to 1."""
+        """Return the time [s], at full speed, when the motion has covered a fraction of the way, 0 to 1."""
         early, late = self.law.begins, self.duration
         for _ in range(40):
             middle = 0.5 * (early + late)
@@ -177,7 +177,7 @@ class PlannedMotion(Trajectory):
         )
 
     def next(self) -> Floats:
-        """Advance by one tick and return the parameter; from the end time on, this is exactly the path's end."""
+        """Advance one tick and return the parameter; from the end time on, this is exactly the path's end."""
         if self._pace.steady(self.speed):
             self._ticks += 1
         else:
@@ -235,8 +235,9 @@ class PlannedMotion(Trajectory):
     def hold(self, acceleration: float) -> bool:
         """Pause the motion if it then stands noticeably sooner; return whether it pauses.
 
-        Near its end a motion already brakes and leaves little acceleration for a pause, which would take longer. Every
-        entry of the parameter slows down with at most `acceleration`, which must not exceed that of `agility`.
+        Near its end a motion already brakes and leaves little acceleration for a pause, which would take
+        longer. Every entry of the parameter slows down with at most `acceleration`, which must not exceed
+        that of `agility`.
         """
         paused = self.fork()
         paused.speed, paused._pace.acceleration = 0.0, acceleration  # noqa: SLF001  one of its own kind

@@ -20,11 +20,12 @@ CLOSE = 1e-6  # difference below which the delay equals its target [ticks]
 class PlayOut:
     """Position of a stream to play at each tick, in sequence numbers.
 
-    The sender's clock may differ, and transport delay varies. If set-point k arrives before tick i, its lateness is i
-    minus k periods. The play-out delay D suits the latest of recent set-points, but is not much longer than the
-    earliest needs. So play-out compensates jitter, follows a slow or fast clock, and does not wait for gaps. D follows
-    its target through three first-order lags, without overshoot. With stream velocity q', q̈ contains -q' D̈; the lags'
-    time constant, zero at rest, keeps this term and its jerk within a fraction of the limits.
+    The sender's clock may differ, and transport delay varies. If set-point k arrives before tick i, its
+    lateness is i minus k periods. The play-out delay D suits the latest of recent set-points, but is not much
+    longer than the earliest needs. So play-out compensates jitter, follows a slow or fast clock, and does not
+    wait for gaps. D follows its target through three first-order lags, without overshoot. With stream
+    velocity q', q̈ contains -q' D̈; the lags' time constant, zero at rest, keeps this term and its jerk
+    within a fraction of the limits.
     """
 
     def __init__(
@@ -47,7 +48,7 @@ class PlayOut:
 
     @property
     def delay(self) -> float:
-        """Time from arrival to play-out of the set-points that come earliest relative to their number [ticks]."""
+        """Time from arrival to play-out of set-points that come earliest relative to their number [ticks]."""
         return self._lags[2] - self._earliest
 
     @property
@@ -82,7 +83,7 @@ class PlayOut:
             self._wanted = wanted
 
     def advance(self, speed: float, behind: float) -> None:
-        """Advance by one tick; `speed` is the fastest joint's velocity [rad/s], `behind` the reference's lag [s]."""
+        """Advance by one tick; `speed`: fastest joint's velocity [rad/s]; `behind`: reference's lag [s]."""
         self._now += 1
         delay = self._lags[2]
         if behind > 0.0:

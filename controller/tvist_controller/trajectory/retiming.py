@@ -1,8 +1,9 @@
 """Time laws along curves with varying limits: the quickest with bounded jerk.
 
-In the phase plane of s and b = ṡ², constant acceleration is a straight line, db/ds = 2 s̈. A backward and a forward
-pass through the curve's cells find the largest permitted b (Bobrow, Dubowsky and Gibson 1985, with bounds independent
-of the sign of s̈). This motion's acceleration has steps; the moving mean of s(t) over `ramp` seconds has bounded jerk.
+In the phase plane of s and b = ṡ², constant acceleration is a straight line, db/ds = 2 s̈. A backward and a
+forward pass through the curve's cells find the largest permitted b (Bobrow, Dubowsky and Gibson 1985, with
+bounds independent of the sign of s̈). This motion's acceleration has steps; the moving mean of s(t) over
+`ramp` seconds has bounded jerk.
 
 This mean, and any shaper behind it, mixes moments of the motion and so passes a place at speeds of its neighbourhood.
 Joint limits in a cell therefore hold for all cells passed within a time window.
@@ -80,7 +81,7 @@ def forward_backward_pass(
 def window_max(
     times: Floats, window: float, values: Floats, lowest: bool
 ) -> Floats:  # pragma: no cover  compiled
-    """Return for each cell the largest (or lowest) value of all cells that the motion passes within ± `window` [s].
+    """Return for each cell the largest (or lowest) value of all cells passed within ± `window` [s].
 
     `times` are those at the edges, shape (c + 1,) [s]; `values` has a row per cell, shape (c, r).
     """
@@ -101,9 +102,10 @@ def window_max(
 
 @compiled
 def flatten_peaks(edges: Floats, b: Floats, ramp: float, known: int) -> Floats:  # pragma: no cover  compiled
-    """Insert constant speed for the time `ramp` [s] between acceleration and braking, which halves the jerk there.
+    """Insert constant speed for `ramp` [s] between acceleration and braking, which halves the jerk there.
 
-    Nothing changes up to edge `known`; if the motion brakes there, it first keeps its speed. `b` is ṡ² at the edges.
+    Nothing changes up to edge `known`; if the motion brakes there, it first keeps its speed. `b` is ṡ² at the
+    edges.
     """
     out, last = b.copy(), len(b) - 1
     number = known + 1
@@ -133,11 +135,11 @@ def flatten_peaks(edges: Floats, b: Floats, ramp: float, known: int) -> Floats: 
 
 
 class RetimedLaw:
-    """Time law of a curve's parameter: moving mean, over `ramp` seconds, of a motion with stepped acceleration.
+    """Time law of a curve's parameter: moving mean over `ramp` seconds of a motion with stepped acceleration.
 
-    Before the mean, acceleration changes only at the edges (c + 1,). There ṡ² is `b`, which is 0 at the last edge
-    and may be 0 at the first. `rate` is the time rate, above 0. `start` is the time at the first edge, before the
-    mean and at rate 1 [s]; if `b` is not 0 there, the mean is known only `ramp` seconds later.
+    Before the mean, acceleration changes only at the edges (c + 1,). There ṡ² is `b`, which is 0 at the last
+    edge and may be 0 at the first. `rate` > 0 is the time rate. `start` is the time at the first edge, before
+    the mean and at rate 1 [s]; if `b` is not 0 there, the mean is known only `ramp` seconds later.
     """
 
     def __init__(self, edges: Floats, b: Floats, ramp: float, rate: float = 1.0, start: float = 0.0) -> None:
@@ -173,7 +175,7 @@ class RetimedLaw:
 
     @property
     def moments(self) -> Floats:
-        """Times at which velocity or acceleration may be largest: at each edge, half a ramp later, a ramp later [s]."""
+        """Times when velocity or acceleration may be largest: each edge, half a ramp and a ramp later [s]."""
         times = self._times[1:]
         return np.concatenate((times, times + 0.5 * self.ramp, times + self.ramp)) / self.rate
 
@@ -240,8 +242,8 @@ def longer_law(
 ) -> RetimedLaw | None:
     """Return the quickest law that equals the law `before` up to an edge, and continues behind its end.
 
-    The way begins at edge `first` of `before`. Both laws have the same ramp, and are equal up to the way's edge
-    `known`; None if the limits cannot be kept from there. For `jerk` and `window` see `quickest_law`.
+    The way begins at edge `first` of `before`. Both laws have the same ramp and are equal up to the way's
+    edge `known`; None if the limits cannot be kept from there. For `jerk` and `window` see `quickest_law`.
     """
     fixed, ramp, start = before.b[first : first + known + 1], before.ramp, float(before.times[first])
     # The ramp is fixed, so limit the acceleration to keep the jerk.
@@ -269,7 +271,7 @@ def _lastingly(way: RetimingLimits, b: Floats, ramp: float, window: float, known
 
 
 def _lasting(cells: Cells, times: Floats, window: float) -> Cells:
-    """Return each cell's limits combined with those of all cells passed within a time window; `times` at the edges."""
+    """Combine each cell's limits with those of all cells passed in a time window; `times` at the edges."""
     return Cells(
         window_max(times, window, cells.fastest[:, None], True)[:, 0],
         window_max(times, window, cells.p, False),
@@ -278,7 +280,7 @@ def _lasting(cells: Cells, times: Floats, window: float) -> Cells:
 
 
 def _goes_on(way: RetimingLimits, b: Floats, known: int) -> bool:
-    """Return whether a motion that is fixed up to edge `known` keeps the limits in the cell behind this edge."""
+    """Return whether a motion fixed up to edge `known` keeps the limits in the cell behind this edge."""
     cell = slice(known, known + 1)
     acceleration = 0.5 * (b[known + 1] - b[known]) / (way.edges[known + 1] - way.edges[known])
     return all(

@@ -30,7 +30,7 @@ FLAT = 1e-12  # factor of a rate treated as zero
 
 @compiled_for_ticks
 def fitting_rates(x: Floats, y: Floats, low: Floats, high: Floats) -> tuple[float, float]:
-    """Return least and largest r with low ≤ x + r y ≤ high in all entries; if there is none, least > largest."""
+    """Return least and largest r with low ≤ x + r y ≤ high in all entries; if none, least > largest."""
     lowest, highest = -math.inf, math.inf
     for i in range(len(x)):
         if abs(y[i]) < FLAT:
@@ -48,7 +48,7 @@ def rate_by_bend(
 ) -> float:
     """Return the rate that path curvature permits; `slope` becomes the larger of its values now and ahead.
 
-    Near a singular posture the joints' path bends, which takes acceleration: second derivative times squared speed.
+    Near singular postures the joints' path bends, taking acceleration: second derivative times squared speed.
     """
     n = len(q)
     jacobian, inverse, later_q = np.empty((6, n)), np.empty((n, 6)), np.empty(n)
@@ -79,9 +79,9 @@ def speed_step(  # noqa: C901, PLR0912  a kernel: its branches are loops
     goal: Floats,  # result: rotation and position of the tool a tick later
     q: Floats,  # result: positions of the joints a tick later, shape (n,) [rad]
 ) -> tuple[int, float]:
-    """Move for a tick at the mean of two velocities, and at the time rate that joint limits and curvature permit.
+    """Move for a tick at the mean of two velocities and the time rate that joint limits and curvature permit.
 
-    Returns FOUND and the final rate; IMPOSSIBLE if limits prevent the step; SINGULAR if curvature nearly prevents it.
+    Returns FOUND and final rate; IMPOSSIBLE if limits prevent the step; SINGULAR if curvature nearly does.
     """
     rate, speed, slowest, acceleration, lag, h = given[0], given[1], given[2], given[3], given[4], given[5]
     n, straight = len(q), chain.shape[0] > 0
@@ -165,7 +165,7 @@ class Speed(Guided):
         limits: MotionLimits,  # of every joint; the jerk is that of stops
         torque: TorqueMargin,
         *,
-        rate: float = 1.0,  # time rate, 0 to 1 [-]; more if the joints are too fast for this rate at the start
+        rate: float = 1.0,  # time rate, 0 to 1 [-]; more if joints are too fast for this rate at the start
         arm: Arm | None = None,  # the arm whose tool has the velocity; None for velocities of the joints
     ) -> None:
         self._q, self._qd, self._qdd = (np.array(values, dtype=float) for values in state)
@@ -213,7 +213,7 @@ class Speed(Guided):
 
     @property
     def _wanted_rate(self) -> float:
-        """The commanded rate, lowered to keep joint velocities; for tool velocities, `speed_step` lowers the rate."""
+        """Commanded rate, lowered to keep joint velocities; for tool velocities, `speed_step` lowers it."""
         if self.arm is not None:
             return self._speed
         fastest = max(float(np.abs(self._goal).max()), float(np.abs(self._u).max()))
@@ -285,7 +285,7 @@ class Speed(Guided):
 
     @property
     def _lag(self) -> float:
-        """Factor from acceleration to change of a tick's step [s^2]: h²/2 for joint motions, h² for tool motions."""
+        """Factor from acceleration to change of a tick's step [s^2]: h²/2 for joints, h² for the tool."""
         return (0.5 if self.arm is None else 1.0) * PERIOD**2
 
     def _ranges(self) -> Floats:
@@ -295,8 +295,8 @@ class Speed(Guided):
         """
         h, limits, speed = PERIOD, self._arm_limits, np.abs(self._qd)
         most = (1.0 + ROUNDING if self.arm is None else USED) * limits.acceleration
-        # A stop ends the present acceleration with limited jerk, and meanwhile the joint still gets faster. Two ticks
-        # are reserved, since the acceleration of the newest reference is known only as the mean of two ticks.
+        # A stop ends the present acceleration with limited jerk; meanwhile the joint gets faster. Two ticks
+        # are reserved, as the newest reference's acceleration is known only as the mean of two ticks.
         left, two = np.maximum(limits.velocity - speed, 0.0), 2.0 * h
         rise = limits.jerk * (np.sqrt(two * two + 2.0 * left / limits.jerk) - two)
         rise = np.minimum(np.minimum(rise, limits.acceleration), most)

@@ -196,7 +196,7 @@ class SplineCurve(Path):
 
 
 def kept_by(bends: Bends, limits: MotionLimits, velocity: float) -> MotionLimits | None:
-    """Return a parameter's limits that keep joint limits on a part of a curve; `acceleration` leaves room for jerk."""
+    """Return parameter limits that keep joint limits on part of a curve; `acceleration` has room for jerk."""
     slope, second, third = float(bends.slope.max()), bends.second, bends.third
     acceleration = (limits.acceleration - second * velocity**2) / slope
     bent = CURVED_SHARE * limits.jerk - third * velocity**3

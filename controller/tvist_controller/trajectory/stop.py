@@ -11,7 +11,7 @@ from tvist_plant.plant import PERIOD
 
 
 class Slowing(Trajectory):
-    """Shortest way to rest of joints or entries of a path's parameter, within limits of acceleration and jerk."""
+    """Shortest way to rest of joints or entries of a path's parameter within acceleration and jerk limits."""
 
     def __init__(
         self,
@@ -88,8 +88,8 @@ class PathStop(Slowing):
     as the motion ever would is therefore never ahead of the motion.
 
     The stop brakes with full jerk from the first step: the second difference b of the last positions becomes
-    b - jerk·h, and the stop continues from the state that central differences give for this step. If the limits
-    allow standing still at once, the stop does so.
+    b - jerk·h, and the stop continues from the state that central differences give for this step. If the
+    limits allow standing still at once, the stop does so.
     """
 
     path: Path
@@ -99,7 +99,7 @@ class PathStop(Slowing):
         path: Path,
         x: Floats,  # newest sample, shape (m,) [rad]
         step: Floats,  # step from the previous sample to x, along the path's direction, shape (m,) [rad]
-        xdd: Floats,  # acceleration from the last three samples, along the path's direction, shape (m,) [rad/s^2]
+        xdd: Floats,  # acceleration from the last 3 samples, along the path's direction, shape (m,) [rad/s^2]
         *,
         acceleration: float,  # limit for the joints [rad/s^2]
         braking: float,  # corresponding limit for the parameter [rad/s^2]
@@ -146,8 +146,9 @@ class PathStop(Slowing):
 class SlowedStop(Trajectory):
     """A motion whose time slows down until it stands.
 
-    If tight bends lie ahead, the motion itself slows down for them, and no stop within constant limits suits them. A
-    `SlowedStop` passes the bends as the motion would, but later: on the path, never ahead of the motion, and no faster.
+    If tight bends lie ahead, the motion itself slows down for them, and no stop within constant limits suits
+    them. A `SlowedStop` passes the bends as the motion would, but later: on the path, never ahead of the
+    motion, and no faster.
     """
 
     path: Path

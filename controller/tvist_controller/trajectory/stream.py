@@ -20,12 +20,13 @@ BRIDGED = 2  # largest number of consecutive missing set-points that are extrapo
 class SetpointStream(LimitedFollower):
     """A reference generated from a client's set-points.
 
-    Set-points at the controller's rate pass unchanged. Set-points at a lower rate are control points of a cubic
-    B-spline, which keeps their limits. The spline needs two periods and jitter a third, so the reference is late
-    by three periods minus a tick, or more if set-points come later or by another clock (`PlayOut`). If a
-    set-point is missing when due, a point on the parabola through its neighbours replaces it. If no set-points
-    arrive, the reference comes to rest within limits until the stream continues. After a gap, or if the sender
-    runs ahead, play-out continues with the newest set-point. The result passes the `Limiter`.
+    Set-points at the controller's rate pass unchanged. Set-points at a lower rate are control points of a
+    cubic B-spline, which keeps their limits. The spline needs two periods and jitter a third, so the
+    reference is late by three periods minus a tick, or more if set-points come later or by another clock
+    (`PlayOut`). If a set-point is missing when due, a point on the parabola through its neighbours replaces
+    it. If no set-points arrive, the reference comes to rest within limits until the stream continues. After a
+    gap, or if the sender runs ahead, play-out continues with the newest set-point. The result passes the
+    `Limiter`.
     """
 
     finished = False  # a stream is ended from outside
@@ -116,7 +117,7 @@ class SetpointStream(LimitedFollower):
         self._heard.clear()
         if min(self._waiting) <= self._head:
             for sequence in sorted(number for number in self._waiting if number <= self._head):
-                # This set-point came too late and was replaced, but later replacements should take it into account.
+                # This set-point came too late and was replaced, but later replacements should use it.
                 self._keep(sequence, self._waiting.pop(sequence))
                 self.late += 1
 
@@ -192,7 +193,7 @@ def linear(
     u: float,  # place between the last two, 0 < u ≤ 1; at 1 the value is exactly the last point [-]
     rate: float,  # of u [1/s]
 ) -> tuple[Floats, Floats, float]:
-    """Interpolate linearly; return value, derivative (of a parabola, which has no steps), and largest derivative."""
+    """Interpolate linearly; return value, derivative (a parabola's, without steps) and largest derivative."""
     found = np.empty((2, len(points[0])))
     fastest = on_parabola(points[1], points[2], points[3], u, rate, found)
     return found[0], found[1], fastest
@@ -201,9 +202,9 @@ def linear(
 def cubic(points: Sequence[Floats], u: float, rate: float) -> tuple[Floats, Floats, float]:
     """Evaluate the uniform cubic B-spline between the middle two of four points; see `linear`.
 
-    The spline's second derivative varies linearly between the points' second differences, and its third derivative
-    is their third difference, so the spline keeps the points' limits of velocity, acceleration and jerk. It passes
-    the points at a distance of q''/6 on the inside of the bend (de Boor 1978, ch. IX to XI).
+    The spline's second derivative varies linearly between the points' second differences, and its third
+    derivative is their third difference, so the spline keeps the points' limits of velocity, acceleration and
+    jerk. It passes the points at a distance of q''/6 on the inside of the bend (de Boor 1978, ch. IX to XI).
     """
     v = 1.0 - u
     found = np.empty((2, len(points[0])))

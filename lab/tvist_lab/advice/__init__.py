@@ -1,4 +1,4 @@
-"""Advice on shapers from logs: which modes vibrate, what each shaper would leave of them, and which to use."""
+"""Advice on shapers from logs: which modes vibrate, what each shaper leaves of them, and which to use."""
 
 from tvist_lab.advice.advise import Advice, RingingMode, advise
 from tvist_lab.advice.in_words import as_dict, command, verdict

@@ -50,7 +50,7 @@ class Advice:
     quiet: Sequence[StopWithRest]
     """Unshaped stops without noticeable vibration."""
     shaped: Sequence[tuple[int, int, str]]
-    """Motions that already had a shaper: index of the file, number in the file, and the shaper's name if known."""
+    """Motions already shaped: index of the file, number in the file, and the shaper's name if known."""
     refused: Sequence[tuple[int, int, str]]
     """Motions that could not be measured: index of the file, number in the file, and the reason."""
     modes: Sequence[RingingMode]
@@ -64,11 +64,11 @@ class Advice:
     slowed_percent: float | None = None
     """Vibration that slower limits with the same added time would leave, according to the modes, median [%]."""
     weak: tuple[float, int] | None = None
-    """If the logs have no tool acceleration: frequency seen in the joints [Hz], and number of motions showing it."""
+    """If logs lack tool acceleration: frequency seen in the joints [Hz], and number of motions showing it."""
 
     @property
     def still_s(self) -> float:
-        """Median settling time of the tool without a shaper [s]; infinite if the recorded rests are too short."""
+        """Median settling time of the tool without a shaper [s]; infinite if recorded rests are too short."""
         return median(one.unshaped.still for one in self.ringing)
 
 
@@ -127,7 +127,7 @@ def recommended(found: Sequence[Option], still: float) -> Option | None:
 
 
 def ringing_modes(stops: Sequence[StopWithRest]) -> list[RingingMode]:
-    """Group modes of stops if their frequencies differ by at most 7 %; the mode found in most motions comes first."""
+    """Group modes of stops if their frequencies differ by up to 7 %, the mode found in most motions first."""
     pool = [(place, mode) for place, one in enumerate(stops) for mode in one.result.modes]
     found = []
     while pool:

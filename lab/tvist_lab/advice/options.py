@@ -101,7 +101,7 @@ def impulses_of(shaper: str, modes: Modes) -> Impulses:
 
 
 def options(stops: Sequence[StopWithRest]) -> list[Option]:
-    """Judge every catalogue shaper on stops with vibration; leave out shapers that cannot be judged on all of them."""
+    """Judge each catalogue shaper on stops with vibration; leave out shapers that cannot be judged on all."""
     return [
         option
         for aim in _aims(stops)
@@ -128,7 +128,7 @@ def _judged(name: str, aim: Aim) -> Option | None:
 
 
 def left_of_modes(stop: StopWithRest, left: Callable[[float, float], Any]) -> float | None:
-    """Return the share of a stop's vibration that is left, as root of its modes' energy [-]; None without modes.
+    """Return the share left of a stop's vibration, as root of its modes' energy [-]; None without modes.
 
     `left` is a function from a mode's f_d [Hz] and ζ to the share of its amplitude that is left [-].
     """
@@ -211,7 +211,7 @@ def _estimated(stop: StopWithRest) -> Modes:
 def _held_out(
     stops: Sequence[StopWithRest], count: int
 ) -> tuple[dict[StopWithRest, Modes], frozenset[StopWithRest]]:
-    """Return modes for judging each stop, found in the other half of stops, and the stops judged by their own modes."""
+    """Return modes to judge each stop, from the other half of stops, and stops judged by their own modes."""
     if len(stops) == 1:
         return {stops[0]: best_modes(stops, count)}, frozenset(stops)
     ordered = sorted(stops, key=lambda one: one.group)  # so that each half has its share of the repetitions
@@ -221,7 +221,7 @@ def _held_out(
 
 
 def best_modes(stops: Sequence[StopWithRest], count: int) -> Modes:
-    """Find the modes with which ZV shapers would leave least vibration after stops, in the order of frequency."""
+    """Find the modes with which ZV shapers would leave least vibration after stops, ordered by frequency."""
     # These modes suit shaping better than fitted ones: if an arm has more modes than a shaper, the best aim lies
     # between them.
     loudest = sorted(stops, key=lambda one: -one.unshaped.rms)[:ENOUGH]

@@ -39,7 +39,7 @@ class ResidualVibration(NamedTuple):
     rms: float
     """rms of |α| from 20 ms after the stop, for up to 0.5 s, without the sensor's noise [m/s²]."""
     still: float
-    """Time from the unshaped stop until |α| stays below 0.1 m/s² or the noise [s]; infinite if it never does."""
+    """Time from the unshaped stop until |α| stays below 0.1 m/s² or the noise [s]; infinite if never."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +153,7 @@ def followed(recording: Recording) -> str:
 
 
 def _noise(tail: Floats, period: float) -> float:
-    """Return the mean square of the noise, summed over the axes [m²/s⁴]; vibration in the tail is subtracted."""
+    """Return the noise's mean square, summed over axes [m²/s⁴]; vibration in the tail is subtracted."""
     rings = fit_ring_down(tail, period, modes=2, offset=True, skip=0.0, window=TAIL)
     return 3.0 * rings.rms**2 if rings.r_squared > RINGS else float(np.sum(np.var(tail, axis=0)))
 

@@ -1,1 +1,1 @@
-"""Speed of this machine: number of robots it can run, lateness of their ticks, and processor time of a tick."""
+"""Speed of this machine: number of robots it can run, lateness of their ticks and processor time per tick."""

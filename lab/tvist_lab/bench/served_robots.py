@@ -166,7 +166,7 @@ def rss_mb(pid: int) -> float:
 
 
 async def robots_at_500_hz(seconds: float, tell: Callable[[str], None], options: Sequence[str] = ()) -> int:
-    """Return the largest number of robots in one process on one core at which no robot misses more than `MISSED`.
+    """Return the largest number of robots in one process on one core at which none misses more than `MISSED`.
 
     A client, on another core if there is one, reads every state. Each number is measured for `seconds`;
     `tell` receives a description before each measurement.

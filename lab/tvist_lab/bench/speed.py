@@ -22,7 +22,7 @@ LIBRARIES = ("tvist", "eclipse-zenoh", "mcap", "msgspec", "mujoco", "numba", "nu
 
 
 def speed(seconds: float, shaper: str, tell: Callable[[str], None]) -> dict[str, Any]:
-    """Measure for `seconds` each; with 0, serve no robot. `tell` gets a description before each measurement."""
+    """Measure for `seconds` each; if 0, serve no robot. `tell` gets a description before each measurement."""
     result: dict[str, Any] = {
         "machine": this_machine(),
         "seconds": seconds,

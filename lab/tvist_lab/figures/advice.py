@@ -37,7 +37,7 @@ def advice_figures(advice: Advice) -> tuple[Figure, Figure]:
 
 
 def _worst_stop(advice: Advice) -> Figure:
-    """Draw |α| around the stop with most vibration, as recorded and as predicted with the recommended shaper."""
+    """Draw |α| around the stop with most vibration, as recorded and as predicted with the advised shaper."""
     assert advice.best is not None
     stop = max(advice.best.left, key=lambda one: one.unshaped.rms)
     impulses = impulses_of(advice.best.shaper, advice.best.aim.judged[stop])

@@ -159,7 +159,7 @@ def compared_figure(motions: Sequence[ComparedPanel], unshaped: Sequence[str] = 
 
 
 def _around_stop(recorded: Mapping[str, Recorded]) -> dict[str, tuple[Floats, Floats, float]]:
-    """Return of each curve time after the first one's stop [s], |α|, and its peak after its own stop [m/s²]."""
+    """Return of each curve time after the first's stop [s], |α|, and its peak after its own stop [m/s²]."""
     curves = {}
     (first, motion), *_ = recorded.values()
     stop = float(first.time[motion.arm_stop(first)] - first.time[motion.start])

@@ -69,7 +69,7 @@ def move_plan_figure(plan: JogPlan) -> Figure:
 
 
 def identified_figure(name: str, measured: Floats, fitted: Floats) -> Figure:
-    """Draw the lowest mode at each ring-down: fitted to the other ring-downs against fitted to this one alone.
+    """Draw the lowest mode at each ring-down: fitted to the others against fitted to this one alone.
 
     `measured` and `fitted` hold f_d [Hz] and ζ [-], shape (2, N); `name` is the calibration's.
     """

@@ -231,7 +231,7 @@ def figure_16(motions: Mapping[str, tuple[Recorded, Recorded]]) -> Figure:
 
 
 def _draw(panel: Axes, recorded: Recorded, style: Series, label: str) -> tuple[Residual, str]:
-    """Draw one recording; return its residual vibration, and a remark unless that is the start of the drawn decay."""
+    """Draw one recording; return its residual vibration, and a remark unless that starts the drawn decay."""
     recording, motion = recorded
     start, rv = recording.time[motion.start], residual(recording, motion)
     alpha = amplitude(tool_acceleration(recording))

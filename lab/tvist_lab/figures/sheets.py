@@ -15,7 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
 STYLES = ("paper", "slides")
-"""Style sheets besides the default: `paper` moves text to a file beside the figure, `slides` has larger type."""
+"""Style sheets besides the default: `paper` moves text to a file beside figures, `slides` has larger type."""
 SUFFIX = ".mplstyle"
 RANGES = {"figure.figsize": (2.0, 40.0), "savefig.dpi": (30.0, 2400.0)}
 """Range of width [inch] and resolution [dots per inch] in a style sheet."""
@@ -115,7 +115,7 @@ def save(figure: Figure, path: str | Path) -> Path:
 
 
 def headed(figure: Figure | SubFigure) -> list[Axes]:
-    """Return the panels whose heading is not visible, but stored as label; labels of colour bars start with "<"."""
+    """Return panels whose heading is invisible, but stored as label; labels of colour bars start with "<"."""
     return [panel for panel in figure.axes if not str(panel.get_label() or "<").startswith("<")]
 
 

@@ -122,7 +122,7 @@ def sweep_figure(entries: Sequence[dict[str, Any]], settings: Sequence[str]) -> 
 def robustness_figure(
     cells: Mapping[str, Sequence[dict[str, Any]]], errors: Mapping[str, Sequence[float]]
 ) -> Figure:
-    """Draw each shaper's reduction for each size of error: median with a bar to the 5th percentile, worse sign.
+    """Draw each shaper's reduction for each error size: median with a bar to the 5th percentile, worse sign.
 
     `cells` are entries by kind of error, ordered by delay; see `tvist_lab.studies.robustness`.
     """
@@ -273,7 +273,7 @@ def _point(row: dict[str, Any]) -> tuple[float, float]:
 
 
 def _beside(place: int, point: tuple[float, float], points: Sequence[tuple[float, float]]) -> bool:
-    """Whether to write a name on the right of its point: away from a close neighbour, otherwise alternately."""
+    """Whether to write a name on the right of its point: away from a close neighbour, else alternately."""
     x, y = point
     away = [other - x for other, height in points if abs(math.log(y / height)) < 0.12]
     if any(0.0 < other < 45.0 for other in away):

@@ -93,8 +93,9 @@ def panels(
 ) -> tuple[Figure, list[Axes]]:
     """Create a figure as wide as the style sheet says; return it and its panels row by row.
 
-    `height` is in inches in the default style; larger type makes the figure higher. With `share_x`, panels of a column
-    share the lowest axis; with `share_y`, panels of a row share the leftmost; `ratios` are the heights of the rows.
+    `height` is in inches in the default style; larger type makes the figure higher. With `share_x`, panels of
+    a column share the lowest axis; with `share_y`, panels of a row share the leftmost; `ratios` are the
+    heights of the rows.
     """
     size = rcParams["figure.figsize"][0], height * _scale("font.size") ** 0.5
     figure = Figure(figsize=size, layout="constrained")

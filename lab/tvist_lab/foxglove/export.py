@@ -280,7 +280,7 @@ def _transforms(
 
 
 def _curves(recording: Recording) -> tuple[Iterator[tuple[int, dict[str, float]]], list[str]]:
-    """Return |α| [m/s²], the largest joint acceleration before and after the shaper [rad/s²] by tick, and notes."""
+    """Return |α| [m/s²], largest unshaped and shaped joint acceleration [rad/s²] by tick, and notes."""
     before, after = (np.abs(recording[f"{name}_qdd"]).max(axis=1) for name in ("unshaped", "target"))
     found, notes = {"after_shaper": after}, []
     if np.any(recording["shaper_delay"] > 0.0) and np.any(after) and np.array_equal(before, after):

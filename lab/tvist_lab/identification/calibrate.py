@@ -1,4 +1,4 @@
-"""Fit a calibration to ring-downs: springs and drives, polynomials if the workspace is covered, and accuracies."""
+"""Fit a calibration to ring-downs: springs, drives, accuracies; polynomials if the workspace is covered."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -231,7 +231,7 @@ def check_logs(description: RobotDescription, logs: Sequence[Log]) -> None:
 
 
 def more_jogs(forecast: ModeForecast, last: Ringing) -> tuple[Jog, ...]:
-    """Propose jogs that would add most information; the first way starts where the last ring-down was recorded."""
+    """Propose jogs that add most information; the first way starts where the last ring-down was recorded."""
     arm = forecast.arm
     counts = [PROPOSED if number == last.payload else 0 for number in range(len(arm.payloads))]
     candidates = free_configurations(arm.description, (arm.payloads[last.payload],), CANDIDATES, 0)
@@ -241,7 +241,7 @@ def more_jogs(forecast: ModeForecast, last: Ringing) -> tuple[Jog, ...]:
 def _with_polynomials(
     calibration: Calibration, arm: ArmModes, ringings: Sequence[Ringing], springs: ModalFit
 ) -> tuple[Calibration, str]:
-    """Add polynomials for the payload with most ring-downs; if they cannot be fitted well, return the reason."""
+    """Add polynomials for the payload with most ring-downs; if they do not fit well, return the reason."""
     counted = Counter(r.payload for r in ringings)
     payload = max(counted, key=lambda number: (counted[number], arm.payloads[number].mass))
     try:

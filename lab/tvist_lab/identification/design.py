@@ -80,7 +80,7 @@ def choose(
 def most_informative(
     knowledge: Floats, says: dict[tuple[int, int], Floats], counts: Sequence[int]
 ) -> list[tuple[int, int]]:
-    """Return the keys of the most informative matrices, the best first; of keys that end in k, `counts[k]`."""
+    """Return the keys of the most informative matrices, best first; of keys that end in k, `counts[k]`."""
     left, chosen = list(counts), list[tuple[int, int]]()
     while open_ := [key for key in says if key not in chosen and left[key[1]] > 0]:
         best = max(open_, key=lambda key: float(np.linalg.slogdet(knowledge + says[key])[1]))
@@ -91,7 +91,7 @@ def most_informative(
 
 
 def predicted(arm: ArmModes, q: Floats, payload: int, logarithms: Floats | None = None) -> Ringing:
-    """Predict the ring-down after a jog; the arm is linearized at the jog's end, its feed-forward is perfect."""
+    """Predict the ring-down after a jog; the arm is linearized at the jog's end, its feed-forward perfect."""
     flexible, mass = arm.flexible[payload], arm.mass(q, payload)
     drivetrain = arm.drivetrain(arm.guess if logarithms is None else logarithms)
     inertia, damping, stiffness = drivetrain.system(mass)

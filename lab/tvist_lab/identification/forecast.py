@@ -68,8 +68,8 @@ class ModeForecast:
 
     def at(self, q: Floats, payload: int, modes: int = 1) -> ForecastModes:
         """Return the lowest modes at a configuration with one of the payloads."""
-        # An error of the masses shifts the modes, but it also shifted the fitted parameters; both effects mostly
-        # cancel.
+        # An error of the masses shifts the modes, but it also shifted the fitted parameters; both effects
+        # mostly cancel.
         arm, here, mass = self.arm, self.fit.logarithms, self.arm.mass(q, payload)
 
         def logarithms(parameters: Floats, mass: Floats) -> Floats:
@@ -85,7 +85,7 @@ class ModeForecast:
         return ForecastModes(*np.exp(found), *errors)
 
     def widened(self, left: Sequence[LeftOut]) -> "ModeForecast":
-        """Return a forecast with errors enlarged, if necessary, to those found at ring-downs left out of fits."""
+        """Return a forecast with errors enlarged, if necessary, to those at ring-downs left out of fits."""
         squares: list[tuple[float, float]] = []
         for one in left:
             known = self.at(one.ringing.q, one.ringing.payload, MODES)
@@ -106,8 +106,8 @@ class ModeForecast:
 
 def contradicting(arm: ArmModes, ringings: Sequence[Ringing]) -> list[int]:
     """Find ring-downs that no springs and drives can explain together with the others."""
-    # A wrong ring-down also spoils the fit of the others. So leave out each of the worst explained ones in turn,
-    # remove the one without which the fit is best, and repeat until the rest agree.
+    # A wrong ring-down also spoils the fit of the others. So leave out each of the worst explained ones in
+    # turn, remove the one without which the fit is best, and repeat until the rest agree.
     fit = fit_modal(arm, ringings)
     rest = list(range(len(ringings)))
     guilty: list[int] = []

@@ -177,7 +177,7 @@ def plan_ways(
     counts: Sequence[int],
     known: tuple[Floats, Floats] | None = None,
 ) -> list[Jog]:
-    """Choose the most informative jogs for each payload and find ways to them; leave out jogs without a free way.
+    """Choose the most informative jogs per payload and find ways to them; leave out jogs without a free way.
 
     `known` holds the logarithms of the parameters and their covariance; None means the guess.
     """
@@ -212,7 +212,7 @@ def slower(limits: MotionLimits, quickness: float) -> MotionLimits:
 
 
 def _quickness(dynamics: InverseDynamics, start: Floats, end: Floats, torque: Floats) -> float:
-    """Return the largest `quickness` of a jog, up to 1, with which jog and ring-down keep the torque limits."""
+    """Return the largest `quickness` of a jog, up to 1, with which jog and ring-down keep torque limits."""
     # If a drive saturated, the ring-down would not be free vibration.
     room = acceleration_on_way(dynamics, JointLine(start, end), start, end - start, LIMITS.velocity, torque)
     return min(1.0, float(np.sqrt(room / (1.0 + REBOUND) / LIMITS.acceleration)))
@@ -230,7 +230,7 @@ def is_free(collisions: CollisionModel, *postures: Floats) -> bool:
 
 
 async def make_jogs(robot: Robot, control: Arm, plan: JogPlan, progress: Progress) -> RingDownLogs:
-    """Measure friction in a slow motion, then make the jogs, each just strong enough for a clear ring-down."""
+    """Measure friction in a slow motion, then make jogs, each just strong enough for a clear ring-down."""
     # If the robot takes only positions, its torques are unknown: instead of the slow motion, turn its last
     # joint to find its lag.
     info, began = await robot.info(), (await robot.state()).tick

@@ -33,7 +33,7 @@ Complex = npt.NDArray[np.complex128]
 
 MODES = 4  # number of modes in a ring-down; a robot arm's higher modes decay within a few ticks
 RAYLEIGH = 2.0 / (3.0 * np.pi) + 0.5j
-"""Change of damping ratio (real) and frequency (imaginary) per relative loss of stiffness by hysteresis [-]."""
+"""Change of damping ratio (real) and frequency (imaginary) per relative stiffness loss by hysteresis [-]."""
 SMOOTHED = 0.03  # width of the window in which the amplitude is determined [s]
 DIFFERENCE_STEP = 1e-4  # step of a logarithm for finite differences [-]
 INSIDE = 1e-3  # distance of a starting point from the bounds of the search [-]
@@ -161,8 +161,8 @@ def fit_modal(arm: ArmModes, ringings: Sequence[Ringing], start: Floats | None =
 
 def fit_from_many(arm: ArmModes, ringings: Sequence[Ringing]) -> ModalFit:
     """Return the best fit from several starting points."""
-    # Parameters can compensate each other, so several sets may explain the ring-downs equally well. A parameter
-    # that differs between such sets is uncertain: their spread, weighted by likelihood, adds to the deviations.
+    # Parameters can compensate each other, so several sets may explain ring-downs equally well. A parameter
+    # that differs between sets is uncertain: their spread, weighted by likelihood, adds to the deviations.
     rng = np.random.default_rng(0)
     starts = [arm.guess, *(arm.guess + rng.normal(0.0, SPREAD, (STARTS - 1, len(arm.guess))))]
     fits = [fit_modal(arm, ringings, start) for start in starts]
@@ -196,14 +196,14 @@ def of_masses(arm: ArmModes, ringings: Sequence[Ringing], fit: ModalFit) -> Floa
 
 
 def information(arm: ArmModes, ringing: Ringing, logarithms: Floats) -> Floats:
-    """Return a ring-down's information about the parameters: the inverse of their covariance, shape (P, P)."""
+    """Return a ring-down's information about the parameters: inverse of their covariance, shape (P, P)."""
     change = _Signal(arm, ringing).slopes(arm, logarithms)
     return np.asarray(change.T @ change)
 
 
 @dataclass(frozen=True)
 class OwnPoles:
-    """Modes fitted to one ring-down alone, their accuracy, and how much worse given poles explain the ring-down."""
+    """Modes fitted to one ring-down alone, their accuracy, and how much worse given poles explain it."""
 
     f_d: Floats  # damped frequencies, shape (k,) [Hz]
     zeta: Floats  # damping ratios, shape (k,) [-]
@@ -211,7 +211,7 @@ class OwnPoles:
     zeta_error: Floats  # standard deviation of the logarithm of ζ, shape (k,) [-]
     amplitude: Floats  # largest initial |α| of each mode, shape (k,) [m/s²]
     significance: float
-    """Increase of the residual's sum of squares with the given poles, over the noise's variance [-]; 8 by chance."""
+    """Increase of the residual's sum of squares with given poles, over noise variance [-]; 8 by chance."""
     share: float  # rms that these poles explain but the given ones do not, relative to the vibration [-]
 
     @property
@@ -222,7 +222,7 @@ class OwnPoles:
 
 
 def own_poles(arm: ArmModes, ringing: Ringing, poles: Complex) -> OwnPoles:
-    """Fit poles to one ring-down alone, starting from given poles; springs and drives do not constrain them."""
+    """Fit poles to one ring-down alone, starting at given poles; springs and drives do not constrain them."""
     signal = _Signal(arm, ringing)
     f_d, zeta = describe(poles)
     start = np.log(np.concatenate([f_d, np.clip(zeta, 1e-4, 0.95)]))

@@ -150,7 +150,7 @@ def mounting_of(pairs: Sequence[tuple[Floats, Floats]]) -> Floats:
 
 
 def apart(response: Response, motion: Observed, mounting: Floats, torque: Floats) -> Floats:
-    """Return the twin's forces, angles and torques minus the measured ones, over their inaccuracies, flattened."""
+    """Return the twin's forces, angles and torques minus the measured ones, over inaccuracies, flattened."""
     _, force, inaccuracy = motion.felt
     parts = [((felt_by(response, motion, mounting) - force) / inaccuracy).ravel()]
     own = (response.measured.q, np.full(len(torque), ANGLE)), (response.measured.moment, TORQUE * torque)

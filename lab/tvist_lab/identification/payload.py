@@ -40,7 +40,7 @@ MIN_POSES = 3
 LEAST_ERROR = 0.01  # smallest assumed error of a torque, relative to the joint's friction [-]
 ROTOR = 3.0  # largest assumed inertia of a rotor [kg m^2]
 DISAGREEMENT = (0.3, 4.0)
-"""Masses found at rest and in motion contradict if they differ by more than these kg and standard deviations."""
+"""Masses found at rest and moving contradict if they differ by more than these kg and standard deviations."""
 CERTAIN = 4.0  # distance of a mass's bounds from the estimate, in standard deviations [-]
 LIGHT = 0.1  # mass below which the centre of mass is not reported [kg]
 
@@ -134,8 +134,8 @@ class _Regressor:
 
     def dynamic(self, q: Floats, qd: Floats, qdd: Floats) -> Floats:
         """Return Y(q, q̇, q̈) without the payload's inertia about the flange, shape (n, 4)."""
-        # Two point masses, 1 m to either side of the flange, have equal inertia. Half the difference of their torques
-        # therefore contains the first moment alone.
+        # Two point masses, 1 m to either side of the flange, have equal inertia. Half the difference of their
+        # torques therefore contains the first moment alone.
         none = self.torque(q, qd, qdd)
         mass, *sides = (np.array(pin.rnea(m, m.createData(), q, qd, qdd)) for m in self._models)
         halves = (0.5 * (there - back) for there, back in zip(sides[::2], sides[1::2], strict=True))

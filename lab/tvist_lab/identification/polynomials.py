@@ -22,7 +22,7 @@ class FitError(ValueError):
 
 
 Deviations = dict[str, Spread]
-"""Deviations of a model from measurements [%], by field of `Provenance`; some from fits without the measurement."""
+"""Model deviations from measurements [%], by `Provenance` field; some from fits without the measurement."""
 
 
 def polynomials(

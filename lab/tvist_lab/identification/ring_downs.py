@@ -56,7 +56,7 @@ class Ringing:
     time: Floats  # times of the samples after the first, shape (T,) [s]
     inexact: float = 0.0  # residual of a linear model beyond the noise, rms per axis [m/s²]
     driven: tuple[complex, ...] = ()
-    """Poles with which the set-point comes to rest after the stop, one of each pair [1/s]; empty if it is at rest."""
+    """Poles with which the set-point settles after the stop, one per pair [1/s]; empty if it is at rest."""
     softening: float = 0.0  # share by which hysteresis softens the springs, per amplitude of the tool [1/m]
 
     def rms(self, late: float = 0.0) -> float:

@@ -73,7 +73,7 @@ class Twin:
 
 
 class _Fit:
-    """Recorded motions, and the deviations of simulated ones from them for any values of the fitted numbers."""
+    """Recorded motions, and deviations of simulated ones from them for any values of the fitted numbers."""
 
     def __init__(self, parameters: TwinParameters, seen: Sequence[Observed]) -> None:
         self.parameters, self.seen = parameters, tuple(seen)

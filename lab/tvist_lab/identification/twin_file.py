@@ -21,7 +21,7 @@ def twin_file(twin: Twin, command: str) -> str:
 
 
 def said(twin: Twin) -> list[str]:
-    """Return sentences on the data of a twin's fit, its accuracy, and the parameters kept from the robot file."""
+    """Return sentences on the data of a twin's fit, its accuracy, and parameters kept from the robot file."""
     whose = "logs that it has not seen" if twin.checked else "its logs, each left out of the fit in turn"
     lines = [f"Fitted to {twin.motions} motions; {len(twin.others)} others were left out."]
     median, p90 = twin.error_percent(0.5), twin.error_percent(0.9)

@@ -38,7 +38,7 @@ class TwinParameter:
     table: str  # `drives`, `link_flexibility` or `payload`
     key: str
     places: tuple[int, ...]
-    """Joints, or places in the list of links, that share the number; for a payload, its index and the coordinate."""
+    """Joints, or places in the list of links, that share the number; for a payload: index and coordinate."""
     deviation: float  # standard deviation before the fit; of the logarithm for factors
 
 
@@ -83,7 +83,7 @@ class TwinParameters:
         return next(found, None)
 
     def payload(self, values: Floats, number: int) -> Payload:
-        """Return the payload that the arm carried, by these values, when the payload of this index was declared."""
+        """Return the payload carried, by these values, when the payload of this index was declared."""
         said = self.payloads[number]
         added = dict.fromkeys((("mass", 0), *(("com", axis) for axis in range(3))), 0.0)
         for entry, value in zip(self.entries, values, strict=True):
@@ -96,8 +96,8 @@ class TwinParameters:
 
     def robot(self, values: Floats, payload: int = 0) -> RobotDescription:
         """Return the robot file, with the payload of this index."""
-        # The wind-up feed-forward is scaled such that a controller with the fitted gears moves the motors ahead by
-        # as much as the robot's own controller did with the original gears.
+        # The wind-up feed-forward is scaled such that a controller with the fitted gears moves the motors
+        # ahead by as much as the robot's own controller did with the original gears.
         factors: dict[tuple[str, str], Floats] = {}
         size = max(self.description.joints, len(self.description.link_flexibility.links), 1)
         for entry, value in zip(self.entries, values, strict=True):

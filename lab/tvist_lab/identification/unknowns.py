@@ -46,9 +46,9 @@ def unknowns(description: RobotDescription) -> tuple[Unknown, ...]:
     """Return the parameters of an arm's linear model: one per large joint, one for all joints of the wrist.
 
     Guesses are the robot file's values (geometric mean for a shared parameter), so that parameters without
-    information stay as in the file. Their deviations are wide, since values in a file are often assumed. For a
-    gain of zero, the guess is that of an arm of about 5 kg payload. The deviation of rotor inertias is small,
-    since they act on the visible frequencies like additional link inertia.
+    information stay as in the file. Their deviations are wide, since values in a file are often assumed. For
+    a gain of zero, the guess is that of an arm of about 5 kg payload. The deviation of rotor inertias is
+    small, since they act on the visible frequencies like additional link inertia.
     """
     joints = range(description.joints)
     large = max(LARGE, description.joints - WRIST)
@@ -106,7 +106,7 @@ class ArmModes:
         return self._masses[payload](q).copy()
 
     def heavier(self, q: Floats, payload: int) -> list[Floats]:
-        """Return variants of M(q), (L, L): one with each link, the last with the payload, heavier by a deviation."""
+        """Return variants of M(q), (L, L), with each link, and last the payload, heavier by a deviation."""
         models = (flexible_model(*one) for one in heavier(self.description, body(self.payloads[payload])))
         return [mass_matrix(model)(q).copy() for model in models]
 
@@ -147,7 +147,7 @@ def parameter(unknown: Unknown, value: float, deviation: float) -> ModalParamete
 
 
 def ball(mass: float) -> tuple[float, float, float, float, float, float]:
-    """Return the inertia of a steel ball [kg m²]: torques cannot tell the payload's inertia from the rotors'."""
+    """Return a steel ball's inertia [kg m²]: torques cannot tell the payload's inertia from the rotors'."""
     radius = (3.0 * mass / (4.0 * math.pi * STEEL)) ** (1.0 / 3.0)
     moment = 0.4 * mass * radius**2
     return (moment, 0.0, 0.0, moment, 0.0, moment)

@@ -39,9 +39,9 @@ def workspace_map(
 ) -> WorkspaceMap | None:
     """Compute f_d and ζ of the lowest mode on a grid over the first two joints that change the modes.
 
-    The other joints are in the middle of the workspace; `mass` [kg] on the flange is carried and declared. If the
-    calibration has a modal model, it is used instead of polynomials. None if the arm has one joint, or collides
-    at every point. Raises EstimatorError if the calibration does not fit the arm.
+    The other joints are in the middle of the workspace; `mass` [kg] on the flange is carried and declared. If
+    the calibration has a modal model, it is used instead of polynomials. None if the arm has one joint, or
+    collides at every point. Raises EstimatorError if the calibration does not fit the arm.
     """
     if description.joints < 2:
         return None

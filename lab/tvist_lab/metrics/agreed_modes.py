@@ -38,7 +38,7 @@ FALL = 0.7  # share by which ζ falls meanwhile [-]
 DRIFT_SHARE = 2.0 / 9.0
 """Error of a fit with constant f_d and ζ, as a share of their change during the decay [-].
 
-Let f_d change as e^(-σt), like the amplitude. The mean of f_d, weighted by the squared amplitude, is the value
+Let f_d change as e^(-σt), like the amplitude. The mean of f_d, weighted by squared amplitude, is the value
 after 1/3 of the change. Least squares fit the phase, where late times count more: the value after 5/9 of it.
 """
 
@@ -94,8 +94,8 @@ def agreed_modes(alpha: Floats, time: Floats, period: float, begin: float) -> Ri
 
 def _fits(ring: Ring) -> Iterator[_Fit]:
     """Yield the fit with as many modes as improve it significantly, and the next fit with more modes."""
-    # If a strong mode changes while it decays, two modes at the same frequency would fit it best: a heavily damped
-    # one for its start and a lightly damped one for its end. So modes near each other are merged.
+    # If a strong mode changes while it decays, two modes at the same frequency would fit it best: a heavily
+    # damped one for its start and a lightly damped one for its end. So modes near each other are merged.
     fits = []
     for f_d, zeta in _poles(ring):
         inside = (f_d > 3.05) & (f_d < 0.98 * ring.highest) & (np.abs(zeta) < 0.9 * DAMPING[1])
@@ -160,7 +160,7 @@ def _groups(heard: Sequence[Sequence[Mode]]) -> Iterator[list[Mode]]:
 
 
 def _mean(group: Sequence[Mode], fits: int, middle: float) -> Mode:
-    """Return the mean mode of a group; its amplitude is the lower quartile, where fits without the mode count as 0."""
+    """Return a group's mean mode; its amplitude is the lower quartile, with 0 for fits without the mode."""
     f_d, f_d_error = _weighted([mode.f_d for mode in group], [mode.f_d_error for mode in group])
     zeta, zeta_error = _weighted([mode.zeta for mode in group], [mode.zeta_error for mode in group])
     f_d_error = math.hypot(f_d_error, DRIFT_SHARE * RISE * f_d / CERTAIN)
@@ -180,7 +180,7 @@ def _weighted(values: Sequence[float], errors: Sequence[float]) -> tuple[float, 
 
 
 def _ordered(modes: Sequence[Mode], middle: float) -> list[Mode]:
-    """Return modes that are strong and certain enough, the strongest first, those with a `lighter_beside` last."""
+    """Return modes strong and certain enough, the strongest first, those with a `lighter_beside` last."""
     certain = [m for m in modes if m.f_d_error < 0.04 * m.f_d and m.zeta_error < max(0.5 * m.zeta, 0.01)]
     loudest = max((mode.amplitude for mode in certain), default=0.0)
     loud = [mode for mode in certain if mode.amplitude >= FAINT * loudest]
@@ -190,6 +190,6 @@ def _ordered(modes: Sequence[Mode], middle: float) -> list[Mode]:
 
 
 def lighter_beside(mode: Mode, modes: Sequence[Mode]) -> Mode | None:
-    """If a mode has ζ ≥ 0.1, return another of similar frequency with less than half its ζ; None if there is none."""
+    """If a mode has ζ ≥ 0.1, return another of similar frequency with less than half its ζ, or None."""
     near = (one for one in modes if max(one.f_d / mode.f_d, mode.f_d / one.f_d) < BESIDE)
     return next((one for one in near if one.zeta < 0.5 * mode.zeta), None) if mode.zeta >= HEAVY else None

@@ -8,12 +8,12 @@ import numpy as np
 from tvist_lab.recordings import Floats
 
 WINDOWS = (2, 3, 5, 8)
-"""Numbers of latest measurements to compare with earlier ones: one may be an outlier, small changes need many."""
+"""Numbers of last measurements compared with earlier ones: one may be an outlier, small changes need many."""
 MIN_MEASUREMENTS = 3  # number of earlier measurements that a comparison needs
 KEPT = 40
 SURE_DEVIATIONS = 3.7
-"""Standard deviations beyond which a change is reported if the scatter is known well. For normal measurements this
-would be one false report in 5,000; measurements of real motions have heavier tails."""
+"""Standard deviations beyond which a change is reported if the scatter is known well. For normal measurements
+this would be one false report in 5,000; measurements of real motions have heavier tails."""
 SHOWN, CLEAR = 2.0, 2.5  # half interval in messages, and smallest change, both in standard errors
 FARTHEST = 3.5  # number of its deviations to which a measurement's distance from earlier ones is clipped
 BELIEVED = 4.0  # number of measurements that have as much weight as the expected scatter
@@ -33,13 +33,13 @@ class DetectedChange:
 class ChangeDetector:
     """Compares the latest measurements of a quantity with all before, each with its own error.
 
-    Change-point model: the means before and after a change are unknown, and the likeliest moment of a change is
-    taken (Hawkins, Qiu and Kang, J. Quality Technology 35, 2003). Scatter between motions beyond the errors is
-    estimated from earlier measurements and its expectation; outliers have less weight (Huber, Annals of Mathematical
-    Statistics 35, 1964). After a reported change, earlier measurements are forgotten.
+    Change-point model: the means before and after a change are unknown, and the likeliest moment of a change
+    is taken (Hawkins, Qiu and Kang, J. Quality Technology 35, 2003). Scatter between motions beyond the
+    errors is estimated from earlier measurements and its expectation; outliers have less weight (Huber,
+    Annals of Mathematical Statistics 35, 1964). After a reported change, earlier measurements are forgotten.
 
-    `prior` is the standard deviation of the mean about 0 before any measurement, `scatter` the expected standard
-    deviation between motions beyond measurement errors, `least` the smallest change to report.
+    `prior` is the standard deviation of the mean about 0 before any measurement, `scatter` the expected
+    standard deviation between motions beyond measurement errors, `least` the smallest change to report.
     """
 
     def __init__(self, prior: float, scatter: float, least: float) -> None:

@@ -29,7 +29,7 @@ OFF = 1e-4  # standard deviation of angles at rest, due to gear errors and integ
 VAGUE = 0.25  # relative error from which a gear's compliance counts as unknown in a pose [-]
 HEAVY = 0.7  # error of a mass from which the mass found after a motion is ignored [kg]
 MASS, GEAR, MODES = (1.0, 0.15, 0.7), (0.4, 0.05, 0.15), (0.1, 0.02, 0.03)
-"""Detectors' prior, expected scatter and smallest reported change: of mass in kg, of gears and modes of logarithms."""
+"""Detectors' prior, expected scatter and least reported change: mass [kg], logarithms of gears and modes."""
 UNKNOWN = 0.4  # share of Coulomb friction that may be unknown in each joint, with the worst sign [-]
 
 
@@ -142,7 +142,7 @@ class FitMonitor:
             yield from _told(self._modes.take(u, error), _of_modes)
 
     def _felt(self, q: Floats, feedback: Floats) -> tuple[float, float]:
-        """Return the mass that explains the drives' feedback at rest, and its largest error due to friction [kg]."""
+        """Return the mass explaining drives' feedback at rest, and its largest error due to friction [kg]."""
         per_kg = holding_torque(self._loaded, q) - holding_torque(self._arm, q)
         weighted = per_kg / self._unsure**2
         square = float(weighted @ per_kg)

@@ -75,7 +75,7 @@ def _gravity(recording: Recording, motion: MotionRows, shown: NDArray[np.bool_])
 
 
 def vibration_after_stop(recording: Recording, motion: MotionRows) -> tuple[float, float]:
-    """Return the largest |α| and the largest envelope after the unshaped stop plus the declared delay [m/s²]."""
+    """Return the largest |α| and envelope after the unshaped stop plus the declared delay [m/s²]."""
     # In a log of another controller, take values later than 10 ms after the arm's own stop.
     _, alpha = acceleration_of(recording, motion, _after_declared_stop(recording, motion), smooth=True)
     if len(alpha) < 2:
@@ -84,7 +84,7 @@ def vibration_after_stop(recording: Recording, motion: MotionRows) -> tuple[floa
 
 
 def still_after(recording: Recording, motion: MotionRows, threshold: float = STILL) -> float:
-    """Return the last time at which |α| exceeds a threshold [m/s²], from the start of the unshaped reference [s]."""
+    """Return the last time when |α| exceeds a threshold [m/s²], from the unshaped reference's start [s]."""
     # Use the truth channel if there is one, otherwise the sensor below 60 Hz.
     time, alpha_xyz = acceleration_of(recording, motion, slice(motion.start, motion.end), smooth=True)
     alpha = amplitude(alpha_xyz)

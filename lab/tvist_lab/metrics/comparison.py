@@ -44,7 +44,7 @@ class MotionChange:
 
     @property
     def gain_ms(self) -> int | None:
-        """Time by which the tool is at rest earlier [ms], negative if later; None if it does not come to rest."""
+        """Time by which the tool is at rest earlier [ms], negative if later; None if it is never at rest."""
         if self.still_before is None or self.still_after is None:
             return None
         return round(self.still_before - self.still_after)
@@ -180,12 +180,12 @@ class MotionPair:
     shaper: str
     """Name of the shaper; empty if the recording does not name it."""
     name: str
-    """Named poses at the motion's ends, such as `Q1 → Q3`; if an end has no name, the numbers of both motions."""
+    """Named poses at the motion's ends, such as `Q1 → Q3`; if an end has no name, both motions' numbers."""
     change: MotionChange
 
 
 def pairs(measured: MeasuredRecording) -> list[MotionPair]:
-    """Pair each unshaped motion with the same motion by each shaper, in the order in which the robot made them."""
+    """Pair each unshaped motion with the same motion by each shaper, in the order the robot made them."""
     # Motions are the same if their references before shaping start and end at the same joint angles within
     # 0.02 rad, and last equally long within 2 %. Events tell whether a motion was shaped, else its delay
     # does.

@@ -30,9 +30,10 @@ FEWEST_SEEN = 8
 def measured_spans(recording: Recording, name: str = "actual_q") -> list[tuple[int, int]]:
     """Return first and last row of each motion, in order, from joint angles that are noisy even at rest.
 
-    A joint moves while its speed exceeds 0.01 rad/s, six times the encoders' noise, and 2 % of the fastest speed
-    within half a second, which excludes swinging back. Each motion must reach twice this threshold. Both ends are then
-    shifted outwards by the time in which a speed that grows steadily reaches the threshold, at most 30 ms.
+    A joint moves while its speed exceeds 0.01 rad/s, six times the encoders' noise, and 2 % of the fastest
+    speed within half a second, which excludes swinging back. Each motion must reach twice this threshold.
+    Both ends are then shifted outwards by the time in which a speed that grows steadily reaches the
+    threshold, at most 30 ms.
     """
     seen = np.flatnonzero(np.isfinite(recording[name]).all(axis=1))
     if len(seen) < FEWEST:
@@ -76,7 +77,7 @@ def still_driven(recording: Recording, start: int, stop: int) -> float:
 
 
 def _onwards(q: Floats, velocity: Floats, first: int, last: int) -> Floats:
-    """Return the speed towards a motion's end [rad/s], negative while swinging back; |speed| for motions to and fro."""
+    """Return the speed towards a motion's end [rad/s], negative if swinging back, |speed| if to and fro."""
     joint = int(np.argmax(np.abs(q[last] - q[first])))
     way, travelled = q[last, joint] - q[first, joint], np.sum(np.abs(np.diff(q[first : last + 1, joint])))
     rates = velocity[first : last + 1]
@@ -94,7 +95,7 @@ def _noise_of_speed(q: Floats, period: float) -> float:
 
 
 def _taper(time: Floats, speed: Floats, row: int, inwards: int) -> float:
-    """Return the time in which the speed has reached its value in a row, if it grew with the square of time [s]."""
+    """Return the time in which the speed has reached its value in a row, if it grew as time squared [s]."""
     other = row + 3 * inwards
     if not 0 <= other < len(time):
         return 0.0
@@ -103,10 +104,10 @@ def _taper(time: Floats, speed: Floats, row: int, inwards: int) -> float:
 
 
 def servo_lag(recording: Recording, start: int, stop: int) -> float | None:
-    """Return the lag of `actual_q` behind `target_q` in a motion [s], at least 0; None if the arm does not follow.
+    """Return the lag of `actual_q` behind `target_q` in a motion [s], ≥ 0; None if the arm does not follow.
 
-    The lag is the shift, to a tenth of a sample, of the target from row `start` to `stop` that has the least squared
-    distance to the measured angles. Without these, its accelerations best explain the tool's.
+    The lag is the shift, to a tenth of a sample, of the target from row `start` to `stop` that has the least
+    squared distance to the measured angles. Without these, its accelerations best explain the tool's.
     """
     if "target_q" not in recording:
         return None
@@ -134,7 +135,7 @@ def servo_lag(recording: Recording, start: int, stop: int) -> float | None:
 
 
 def _felt_lag(recording: Recording, start: int, stop: int) -> float | None:
-    """Return the lag with which the target best explains the tool's accelerometer [s]; None if it hardly does."""
+    """Return the lag at which the target best explains the tool accelerometer [s]; None if it hardly does."""
     if SENSOR not in recording:
         return None
     time, period = recording.time, recording.period

@@ -125,7 +125,7 @@ def _motions(recording: Recording) -> list[MotionRows]:
 
 
 def _driven(recording: Recording) -> NDArray[np.bool_] | None:
-    """Return where the target's speed is not zero, shape (T,); None unless a foreign log has one that is 0 at rest."""
+    """Return where target speed is not 0, shape (T,); None unless a foreign log has one that is 0 at rest."""
     if not recording.foreign or "reference_q" in recording or "target_qd" not in recording:
         return None
     moving = np.asarray((np.abs(recording["target_qd"]) > AT_REST).any(axis=1))
@@ -139,7 +139,7 @@ def _displacement(recording: Recording, first: int, past: int) -> float:
 
 
 def _trembles(recording: Recording, spans: Sequence[tuple[int, int, Any, bool]]) -> bool:
-    """Whether the target changes at rest, like measured angles: at least two motions and over a quarter are tiny."""
+    """Whether the target changes at rest, like measured angles: at least 2 motions and over 1/4 are tiny."""
     tiny = [_displacement(recording, *span[:2]) < TINY for span in spans]
     return sum(tiny) > max(1, len(tiny) // 4)
 
@@ -163,7 +163,7 @@ def _step_per_tick(recording: Recording, name: str) -> Floats:
 
 
 def _spans_of_events(recording: Recording) -> list[tuple[int, int, Any, bool]]:
-    """Return of each motion first row, row after the last, number, and whether it was stopped, from events."""
+    """Return of each motion first row, row after the last, number and whether it was stopped, from events."""
     started = [event for event in recording.events if event.kind == "motion_started"]
     ended = {event.id: event for event in recording.events if event.kind in ("motion_done", "motion_stopped")}
     spans = []
@@ -179,7 +179,7 @@ def _spans_of_events(recording: Recording) -> list[tuple[int, int, Any, bool]]:
 
 
 def _spans_of_reference(recording: Recording, moving: NDArray[np.bool_]) -> list[tuple[int, int, Any, bool]]:
-    """Return spans as `_spans_of_events` does, from the rows in which the reference moves; short rests are joined."""
+    """Return spans like `_spans_of_events`, from rows where the reference moves; short rests are joined."""
     rows = np.flatnonzero(moving)
     if not rows.size:
         return []

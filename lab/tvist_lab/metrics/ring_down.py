@@ -144,7 +144,7 @@ class Ring:
         return Ring(self.alpha[:past], self.time[:past], self.period, self.slow_poles, self.evidence)
 
     def basis(self, parameters: Floats) -> Floats:
-        """Return the functions of time whose amplitudes are eliminated, for (f_d, ζ) of each mode, (T, columns)."""
+        """Return functions of time whose amplitudes are eliminated, for (f_d, ζ) per mode, (T, columns)."""
         columns = []
         for f_d, zeta in parameters.reshape(-1, 2):
             decay = np.exp(-decay_rate(f_d, zeta) * self.time)
@@ -159,7 +159,7 @@ class Ring:
 
     def fit(self, modes: int) -> RingDown:
         """Fit one mode, then further ones while they improve the fit."""
-        # A further mode must lie inside the search range: one at an end of the range would represent something else.
+        # A further mode must lie inside the search range: one at an end would represent something else.
         parameters = self._add_mode(np.empty(0))
         for _ in range(1, modes):
             more = self._add_mode(parameters)
@@ -279,7 +279,7 @@ class Ring:
         return np.asarray(np.maximum(innovation / np.abs(1.0 - turns @ filtered) ** 2, 1.0))
 
     def _coloured(self, left: Floats, frequencies: Floats) -> Floats:
-        """Return `colour`, but at least the factor from successive samples, which an unfitted mode cannot lower."""
+        """Return `colour`, but at least the factor from successive samples, which no unfitted mode lowers."""
         return np.maximum(self.colour(left, frequencies), widening(left.reshape(self.alpha.shape)) ** 2)
 
     def _score_covariance(self, jacobian: Floats, left: Floats) -> Floats:

@@ -25,13 +25,13 @@ BASES = np.geomspace(1e6, 3e4, 20)
 CORRELATED_SAMPLES = 3.0  # number of samples that count as one, since the residual is correlated in time
 EXPECTED = 0.07  # standard deviation of the factor's logarithm before any measurement
 UNLIKE, ELSEWHERE = 0.05, 0.1
-"""Standard deviation of the factor between poses, and share of stops with vibration of other parts than the arm."""
+"""Standard deviation of the factor between poses, and share of stops where parts besides the arm vibrate."""
 VAGUE = 0.1  # standard error from which a stop is ignored because it hardly vibrated
 FIRST = 8  # number of stops from which the stiffness of the base is found
 
 
 def unexplained(alpha: Floats, f_d: Floats, zeta: Floats) -> Floats:
-    """Return the energy that modes, constant and slow tail leave unexplained, for each factor in `SCALES` [m²/s⁴].
+    """Return the energy unexplained by modes, constant and slow tail, for each factor in `SCALES` [m²/s⁴].
 
     `alpha` [m/s²], shape (T, 3), starts `SKIP` ticks after the stop; `f_d` [Hz], before scaling, and `zeta`
     have shape (k,).
@@ -51,9 +51,9 @@ class RingListener:
     """Finds the common factor between the frequencies after a stop and a model's, f_d = e^u f_model(q).
 
     The amplitudes of the modes enter linearly and are eliminated (variable projection; Golub and Pereyra,
-    1973), so each u has a sum of squares and hence a likelihood; if a stop hardly vibrates, it is nearly constant.
-    Since the stiffness of the arm's mounting is unknown, the model stands on a flexible base. The stiffness of this
-    base is found once: the likeliest for the first `FIRST` stops.
+    1973), so each u has a sum of squares and hence a likelihood; if a stop hardly vibrates, it is nearly
+    constant. Since the stiffness of the arm's mounting is unknown, the model stands on a flexible base. The
+    stiffness of this base is found once: the likeliest for the first `FIRST` stops.
     """
 
     def __init__(self, description: RobotDescription, payload: Payload) -> None:
@@ -109,7 +109,7 @@ def _certain(likelihoods: Iterable[Floats]) -> list[tuple[float, float]]:
 
 
 def _blurred(likely: Floats) -> Floats:
-    """Return a stop's log-likelihood, (bases, scales), widened for differences of poses and other vibrations."""
+    """Return a stop's log-likelihood, (bases, scales), widened for pose differences and other vibrations."""
     spread = np.exp(-0.5 * ((SCALES[:, np.newaxis] - SCALES) / UNLIKE) ** 2)
     near = np.exp(likely) @ (spread / spread.sum(axis=0))
     anything = np.exp(likely).mean(axis=1).max()

@@ -31,7 +31,7 @@ IMPACTS = {
 }  # impacts listed in the paper, and their columns
 
 SKIP_OF_MEASURED = 0.03
-"""Time after a stop that a ring-down ignores if the stop was found in measured angles, maybe too early [s]."""
+"""Time after a stop that a ring-down ignores if the stop is found in measured angles, maybe too early [s]."""
 
 Row: TypeAlias = dict[str, float | None]
 Table: TypeAlias = dict[str, dict[str, Row]]

@@ -67,8 +67,8 @@ class ProgramMove:
     def peak(self) -> float | None:
         """Largest tool acceleration without gravity from 10 ms until 0.3 s after the stop [m/s²].
 
-        If the next motion started within 0.1 s, the peak is predicted as if the arm had stayed at rest. None without
-        rest or measurement. Ask only after the next motion has started, since the peak is computed once.
+        If the next motion started within 0.1 s, the peak is predicted as if the arm had stayed at rest. None
+        without rest or measurement. Ask only after the next motion started, since the peak is computed once.
         """
         if self.held is None:
             return self.peak_so_far if self.rested >= SEEN else None

@@ -93,7 +93,7 @@ def check_period(path: Path, period: float) -> None:
 
 
 def check_recording(path: Path, recording: Recording, places: Places | None = None) -> None:
-    """Refuse a recording that cannot be analysed; `places` are the rows' positions in the file, by default ticks."""
+    """Refuse a recording that cannot be analysed; `places`: rows' positions in the file, by default ticks."""
     info, columns, tick, time = recording.info, recording.columns, recording["tick"], recording.time
     check_names(path, [*columns, *([] if info is None else [info.name, info.model, info.version])])
     joints = max((columns[name].shape[1:] for name in ANGLES if name in columns), default=())

@@ -59,7 +59,7 @@ VENDORS = {
     "Doosan's RobotStateRt (brackets)": "time=time_stamp,q=actual_joint_position[{}]:deg,"
     "qd=actual_joint_velocity[{}]:deg/s,target_q=target_joint_position[{}]:deg,target_qd=target_joint_velocity[{}]:deg/s",
 }
-"""Columns that each program writes, in the form of `_given`; its joint angles or accelerometer identify a program.
+"""Columns each program writes, in the form of `_given`; its joint angles or accelerometer identify a program.
 
 Only names found in the source of a program that writes them are listed: xArm, Fanuc and others document what
 their controllers send, but no file with a header.

@@ -31,7 +31,7 @@ class ColumnMeaning:
 
     meaning: str  # a phrase; empty for an unknown column
     units: tuple[str, ...] = ()
-    """SI unit of the column, or one for each half of a vector of six; "-" for a ratio; empty without a unit."""
+    """SI unit of the column, or one per half of a vector of six; "-" for a ratio; empty without a unit."""
     whole: bool = False
 
     @property

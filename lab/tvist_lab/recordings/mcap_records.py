@@ -108,8 +108,9 @@ def _unpacked(chunk: Chunk) -> bytes:
 def files_of(path: Path) -> tuple[Path, ...]:
     """Return the files of the recording that a path names, in order.
 
-    A path is a file, a folder, a pattern such as `run-2-part*.mcap`, or the name of a recording with segments; of the
-    latter, the latest run is taken. Raises RecordingError unless the path names one recording without missing segments.
+    A path is a file, a folder, a pattern such as `run-2-part*.mcap`, or the name of a recording with
+    segments; of the latter, the latest run is taken. Raises RecordingError unless the path names one
+    recording without missing segments.
     """
     if path.is_dir():
         found = list(path.glob("*.mcap"))

@@ -15,7 +15,7 @@ from tvist_protocol.modes import RobotMode
 from tvist_protocol.recorded import JsonReader
 
 Block = Mapping[str, Floats]
-"""Fields of consecutive messages by name, shape (T,) or (T, k); NaN for null, and at the end of shorter rows."""
+"""Fields of consecutive messages by name, shape (T,) or (T, k); NaN for null and at the end of short rows."""
 
 REGISTERS = "_register"  # suffix of the names of register banks
 OF_OUR_LINE = ("reference", "unshaped", "estimated", "shaper", "motor_", "setpoint")
@@ -46,7 +46,7 @@ class JsonColumns:
         return block_of([self._reader.read(message) for message in messages], self._fields)
 
     def all(self) -> dict[str, Floats]:
-        """Return all messages as one block. Call this once: it releases data by column, which halves the memory."""
+        """Return all messages as one block. Call once: it releases data by column, which halves memory."""
         blocks, self.blocks = self.blocks, []
         return {name: _joined([block.pop(name) for block in blocks]) for name in self._fields}
 
@@ -175,7 +175,7 @@ def recording_of_blocks(
     in_order = tuple(sorted(events, key=lambda event: int(event.tick)))
     if getattr(info, "watched", None) is None:
         return Recording(columns, in_order, info)
-    # While disconnected, measurements only repeat. Columns of our control line do not describe a watched robot.
+    # While disconnected, measurements repeat. Columns of our control line do not describe a watched robot.
     there = columns["robot_mode"] != RobotMode.DISCONNECTED
     kept = {name: column[there] for name, column in columns.items() if not name.startswith(OF_OUR_LINE)}
     return Recording(kept, in_order, info, foreign=True)

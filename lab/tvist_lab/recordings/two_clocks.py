@@ -1,9 +1,9 @@
-"""Find offset and drift between the clocks of a robot and of a sensor at its flange, from a motion that both measured.
+"""Find offset and drift between the clocks of a robot and a sensor at its flange from a motion both measured.
 
-What a sensor at the flange would measure is computed from the logged joint angles; the real sensor's axes may be
-rotated in any way. The motion is first located by its magnitude, which no rotation changes, at any offset and with
-drifts of up to 2 %. Then offset, drift, rotation (at first from a singular value decomposition that solves Wahba's
-problem: Markley 1988), bias and lever are fitted together to the vectors.
+What a sensor at the flange would measure is computed from the logged joint angles; the real sensor's axes may
+be rotated in any way. The motion is first located by its magnitude, which no rotation changes, at any offset
+and with drifts of up to 2 %. Then offset, drift, rotation (at first from a singular value decomposition that
+solves Wahba's problem: Markley 1988), bias and lever are fitted together to the vectors.
 """
 
 from collections.abc import Iterator
@@ -54,7 +54,7 @@ class BodyFrameSignal:
 
     @property
     def change(self) -> Floats:
-        """Magnitude of the motion beyond noise at rest, equal in any axes: |ω|, or |df/dt| of a force, shape (T,)."""
+        """Magnitude of motion beyond noise at rest, equal in any axes: |ω|, or |df/dt| of a force, (T,)."""
         force = self.lever.shape[2]
         felt = np.linalg.norm(np.gradient(self.vector, 1.0 / RATE, axis=0) if force else self.vector, axis=1)
         more: Floats = np.maximum(felt - np.quantile(felt, AT_REST), 0.0)
@@ -96,7 +96,7 @@ def _measured(time: Floats, q: Floats) -> tuple[Floats, Floats]:
 
 
 def _resampled(time: Floats, values: Floats) -> tuple[Floats, Floats, Floats]:
-    """Resample rows at `RATE` or a multiple: return times, interpolated values, and 0 for gaps of the log, else 1."""
+    """Resample rows at `RATE` or a multiple: return times, interpolated values, and 0 for gaps, else 1."""
     seen = np.isfinite(values).all(axis=1)
     time, values = time[seen], values[seen]
     if len(time) < 2 or not 1.0 < time[-1] - time[0] < SPARSE * len(time) * float(np.median(np.diff(time))):
@@ -159,7 +159,7 @@ def fits(first: BodyFrameSignal, other: BodyFrameSignal) -> list[Clocks]:
 
 
 def _places(first: BodyFrameSignal, other: BodyFrameSignal) -> Iterator[tuple[float, float]]:
-    """Yield candidates at which both signals move at the same times: other clock at the first row, and drift."""
+    """Yield candidates at which both signals move simultaneously: other clock at the first row, and drift."""
     length, rows = first.time[-1] - first.time[0], COARSE / RATE
     moved, moved_there = first.change[::COARSE], other.change
     count = int(np.ceil(DRIFT * length / BLURRED))
@@ -245,10 +245,11 @@ def _inverse(G: Floats, whole: Floats) -> Floats:
 
 
 def _intervals(X: Floats, left: Floats, weight: Floats, since: Floats) -> tuple[float, float]:
-    """Return half the 95 % intervals of the offset, at the end of the log where it is wider, and of the drift.
+    """Return half the 95 % intervals of the offset, at the log's end where it is wider, and of the drift.
 
-    Since residuals are correlated in time and few fast motions have most weight, the fit is repeated, to first order,
-    without each block of `BLOCK` (the jackknife of Tukey 1958, with Student's quantile for the blocks with motion).
+    Since residuals are correlated in time and few fast motions have most weight, the fit is repeated, to
+    first order, without each block of `BLOCK` (the jackknife of Tukey 1958, with Student's quantile for the
+    blocks with motion).
     """
     first = np.unique(np.searchsorted(since, np.arange(since[0], since[-1], BLOCK)))
     pulls = np.add.reduceat(np.einsum("tik,t,ti->tk", X, weight, left), first)

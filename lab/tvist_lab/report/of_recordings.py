@@ -165,7 +165,7 @@ def _panels(files: Sequence[_File], comparisons: Sequence[Comparison]) -> list[C
 
 
 def _pictures(files: Sequence[_File], panels: Sequence[ComparedPanel]) -> Iterator[Picture]:
-    """Yield one picture of the first motions, on one scale, and one of the strongest ring-down of each file."""
+    """Yield a picture of the first motions, on one scale, and one of the strongest ring-down of each file."""
     plain = [file.name for file in files if shaping_of(file.measured.results, file.name).shaped is False]
     unshaped = [WITHOUT, *map(literal, plain)]
     with suppress(NotMeasurableError):

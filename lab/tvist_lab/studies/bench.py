@@ -74,7 +74,7 @@ MORE = (
 
 
 def study(asked: StudyRequest) -> Study:
-    """Return the study: methods, moves and payload errors; if quick, each move has one of the errors, in turn."""
+    """Return the study: methods, moves and payload errors; if quick, each move has one error, in turn."""
     # Only the user's own shapers are inspected here; tests cover those of the package.
     theirs = [
         one
@@ -194,7 +194,7 @@ def _rank(result: Result, asked: StudyRequest, faults: Mapping[str, str]) -> Non
 
 
 def _place(entry: Mapping[str, Any]) -> tuple[float, float]:
-    """Return the sort key of a method: settling time, infinite if it does not settle, then residual vibration."""
+    """Return a method's sort key: settling time, infinite if it does not settle, then residual vibration."""
     still = entry["time_until_still_ms_median"]
     return (math.inf if still is None else still, entry["residual_m_s2_median"])
 

@@ -31,8 +31,8 @@ def inspect(method: Method, description: RobotDescription, moves: Sequence[Move]
 def check_causal(method: Method, task: Task) -> None:
     """Run a shaper on a reference, on others that are equal up to some tick, and on the first again.
 
-    Raises ShaperFaultError if outputs depend on the future, or on earlier runs. If a method gets a move's target in
-    advance, it gets the same target with every reference: it may use the target, but not the way to it.
+    Raises ShaperFaultError if outputs depend on the future or earlier runs. If a method gets a move's target
+    in advance, it gets the same target with every reference: it may use the target, but not the way to it.
     """
     if not isinstance(method, SampleMethod):
         return  # it plans the motion, whose end it may know

@@ -1,9 +1,9 @@
 """`tvist study match`: compare two shapers on the same moves and plants, and test the difference.
 
-Both shapers make each move on each plant, so the difference does not depend on how hard a move is. The interval of
-the median difference is exact for any distribution: its ends are where a sign test at 5 % starts to reject.
-The interval of the 5th percentiles' difference is a percentile bootstrap over pairs. With few moves in the tail,
-this interval is too narrow; it is shown but not used for a verdict.
+Both shapers make each move on each plant, so the difference does not depend on how hard a move is. The
+interval of the median difference is exact for any distribution: its ends are where a sign test at 5 % starts
+to reject. The interval of the 5th percentiles' difference is a percentile bootstrap over pairs. With few
+moves in the tail, this interval is too narrow; it is shown but not used for a verdict.
 """
 
 from collections.abc import Sequence
@@ -66,7 +66,7 @@ def study(asked: StudyRequest) -> Study:
 
 
 def _paired(rows: pl.DataFrame, names: Sequence[str]) -> pl.DataFrame:
-    """Put the results of both shapers for a move on an arm into the first shaper's row; drop the other row."""
+    """Put both shapers' results for a move on an arm into the first shaper's row; drop the other row."""
     columns = {
         f"{word}_{short}": pl.col(measure).filter(pl.col("shaper") == name).first().over("arm", "move")
         for name, word in zip(names, ("first", "second"), strict=True)

@@ -163,7 +163,7 @@ def _draw(result: Result) -> Figures:
 
 
 def example(moves: Sequence[Mapping[str, Any]]) -> int:
-    """Return the index of the move to draw: with median unshaped vibration, if possible among moves that count."""
+    """Return the index of the move to draw: of median unshaped vibration, if possible among counted moves."""
     counted = [place for place, move in enumerate(moves) if move["reduction_percent"] is not None]
     counted = counted or list(range(len(moves)))
     return sorted(counted, key=lambda place: float(moves[place]["unshaped_peak_m_s2"]))[len(counted) // 2]

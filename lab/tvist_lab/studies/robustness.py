@@ -32,7 +32,7 @@ WAITED = pl.col("reduction_percent").is_not_null() & (pl.col("waited_peak_m_s2")
 
 
 def study(asked: StudyRequest) -> Study:
-    """Return the study: a case for each payload error and move, by all shapers on all arms with this error."""
+    """Return the study: a case per payload error and move, by all shapers on all arms with this error."""
     wrong = errors(asked.arms)
     arms: dict[float, dict[str, Variant]] = {}
     for kind in wrong.values():
@@ -72,7 +72,7 @@ def study(asked: StudyRequest) -> Study:
 
 
 def errors(named: Sequence[Variant] = ()) -> dict[str, dict[str, tuple[Variant, float]]]:
-    """Return for each kind of error the tables' columns: by title, the arm and the declared mass's error [-]."""
+    """Return for each kind of error the tables' columns: by title, arm and the declared mass's error [-]."""
     return {
         "stiffness": {f"{100.0 * one:+.0f} %": (with_springs(1.0 + one), 0.0) for one in ERRORS["stiffness"]},
         "payload": {f"{100.0 * one:+.0f} %": (AS_DESCRIBED, one) for one in ERRORS["payload"]},
@@ -81,7 +81,7 @@ def errors(named: Sequence[Variant] = ()) -> dict[str, dict[str, tuple[Variant, 
 
 
 def cells(values: Mapping[str, Any]) -> dict[str, list[dict[str, Any]]]:
-    """Return for each kind of error the tables' entries, in the summary's order, with the column's title added."""
+    """Return for each kind of error the tables' entries, in the summary's order, with the column's title."""
     found = {(one["shaper"], one["arm"], one["payload_error"]): one for one in values["cells"]}
     delays = {one["shaper"]: one["delay_ms_median"] for one in values["summary"]}
     known = {arm for one in errors().values() for arm, _ in one.values()}

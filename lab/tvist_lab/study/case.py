@@ -34,7 +34,7 @@ class Case:
     limits: MotionLimits = PAPER  # limits of every joint
     payload_error: float = 0.0  # error of the declared mass, relative to the carried one [-]
     stream: bool = False
-    """Whether, instead of making the move, to follow a stream that begins at the move's start and is stopped."""
+    """Whether, instead of the move, to follow a stream that begins at the move's start and is stopped."""
     methods: tuple[Method, ...] = ()  # methods for this case; empty for those of its study
     axes: Mapping[str, Any] = field(default_factory=dict)
     """Cells in the case's rows, by column name, that distinguish the case from others of the study."""

@@ -85,9 +85,10 @@ def some(
 ) -> tuple[Method, ...]:
     """Return methods by name, or from files: paths with a class that has `step`, or loaded shapers.
 
-    `calibration` provides the estimates; `masses` are the smallest and largest payload [kg], by default 0 and the
-    rating; `modes` is the number of modes that shapers of the library suppress; `frequency_error` is the share by
-    which every frequency is too high [-]. Raises StudyError for unknown names, DesignError for unknown parameters.
+    `calibration` provides the estimates; `masses` are the smallest and largest payload [kg], by default 0 and
+    the rating; `modes` is the number of modes that shapers of the library suppress; `frequency_error` is the
+    share by which every frequency is too high [-]. Raises StudyError for unknown names, DesignError for
+    unknown parameters.
     """
     recipe = Recipe("zv", calibration, frequency_error, modes)
     found: dict[str, Method] = {}

@@ -1,4 +1,4 @@
-"""Columns of tables on terminals, web pages and in Markdown, and the values that studies compute for columns."""
+"""Columns of tables on terminals, web pages and in Markdown, and the values that studies compute for them."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -17,8 +17,9 @@ class Column:
 
     title: str  # heading; a second line is small on a web page
     of: str | pl.Expr | Callable[[Entry], Any]
-    """Key of the value in an entry, such as "delay_ms" or "less.p5"; or a function of the entry; or an expression
-    that computes the value for a group of rows, which is stored in the entry under the expression's output name."""
+    """Key of the value in an entry, such as "delay_ms" or "less.p5"; or a function of the entry; or an
+    expression that computes the value for a group of rows, which is stored in the entry under the
+    expression's output name."""
     digits: int | None = None  # number of decimals; None for text
     meaning: str = ""  # meaning of the heading's first line
 
@@ -115,7 +116,7 @@ def highest(name: str) -> pl.Expr:
 
 
 def of_group(function: Callable[..., Any], columns: Sequence[pl.Expr], kind: Any, called: str) -> pl.Expr:
-    """Return an expression that calls a function with a group's values in some columns, without rows with null.
+    """Return an expression calling a function with a group's values in some columns, without rows with null.
 
     The function gets one array per column, of equal length, and returns a value of type `kind`, or None;
     `called` names it.

@@ -38,7 +38,7 @@ def run(
 ) -> StudyRun:
     """Run missing and failed jobs, and write all rows to `folder`, if given.
 
-    `executor` starts an executor for the jobs, by default processes of this machine if there are enough jobs. Raises
+    `executor` starts an executor for the jobs, by default processes of this machine given enough jobs. Raises
     StoreError if the folder is in use, unwritable, or of another study; OSError if the executor cannot run.
     """
     with ExitStack() as stack:

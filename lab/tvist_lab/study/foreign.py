@@ -129,7 +129,7 @@ _loaded: dict[Path, Callable[[], Any]] = {}
 
 
 def load_shaper(path: Path) -> Callable[[], Any]:
-    """Return a function that creates the file's shaper: the class with `step`, or a function returning the module.
+    """Return a function creating the file's shaper: the class with `step` or a function returning the module.
 
     The file is run once in each process, so its module's state persists from motion to motion. Raises
     CandidateError if the file cannot be run, or does not contain exactly one shaper.

@@ -29,7 +29,7 @@ RESTING = 4  # ticks at rest before the motion
 
 
 def point_to_point(start: Floats, target: Floats, limits: MotionLimits = PAPER) -> Floats:
-    """Return a double S to the target, beginning with the first sample that may differ from the start, (T, n) [rad]."""
+    """Return a double S to the target, from the first sample that may differ from the start, (T, n) [rad]."""
     return samples_of(quickest_motion(JointLine(start, target), limits))
 
 
@@ -55,7 +55,7 @@ def round_a_corner(start: Floats, corner: Floats, target: Floats) -> Floats:
 
 
 def lengthened(start: Floats, target: Floats, ticks: int, limits: MotionLimits = PAPER) -> Floats:
-    """Return a double S whose jerk is reduced such that it lasts `ticks`, to within a tick, shape (T, n) [rad]."""
+    """Return a double S whose jerk is reduced such that it lasts `ticks`, to within a tick, (T, n) [rad]."""
     low, high = np.log(1e-2 * limits.jerk), np.log(limits.jerk)
     for _ in range(30):  # the duration increases as the jerk decreases
         middle = 0.5 * (low + high)
@@ -91,9 +91,9 @@ class ControlLine:
     ) -> "FollowedReference":
         """Return the drives' commands, for any arm, to follow a shaped reference from rest and then rest.
 
-        The arm follows `shaped` (T', n) [rad]; results are compared with the unshaped `reference`, (T, n) [rad].
-        `delay` [s] is declared by the shaper. `elastic` replaces the feed-forward of the paper's controller,
-        `law` the friction of this line.
+        The arm follows `shaped` (T', n) [rad]; results are compared with the unshaped `reference`, (T, n)
+        [rad]. `delay` [s] is declared by the shaper. `elastic` replaces the feed-forward of the paper's
+        controller, `law` the friction of this line.
         """
         ticks = RESTING + max(len(shaped), len(reference)) + round(REST / PERIOD)
         driven = self._line.drive(self._start, shaped, ticks, RESTING, elastic, law)
@@ -122,8 +122,9 @@ class FollowedReference:
     def simulate(self, plant: SimulatedArm, seed: int) -> Recording:
         """Let a plant follow the reference, with a seed for sensor noise and gear errors.
 
-        The recording starts one tick before the motion. It has the targets that the drives receive, so ticks that a
-        feed-forward needs for derivatives count as delay. Raises ValueError if the plant does not provide the truth.
+        The recording starts one tick before the motion. It has the targets that the drives receive, so ticks
+        that a feed-forward needs for derivatives count as delay. Raises ValueError if the plant does not
+        provide the truth.
         """
         response = respond(plant, self._driven, seed)
         pose = np.zeros((len(response.specific_force), 6))

@@ -73,7 +73,7 @@ class MadeMotion:
 
     @cached_property
     def waited(self) -> float:
-        """Largest true |α| of the unshaped motion, at times later than 10 ms after this motion's stop [m/s²]."""
+        """Largest true |α| of the unshaped motion, later than 10 ms after this motion's stop [m/s²]."""
         waiting = self.unshaped
         stop = self.recording.time[self.rows.shaped_stop] + AFTER_STOP
         return peak_later_than(waiting.recording, waiting.rows, min(stop, waiting.recording.time[-2]))
@@ -89,7 +89,7 @@ class MadeMotion:
         return self.rows.shaped_duration(self.recording)
 
     def still(self, threshold: float = STILL) -> float | None:
-        """Return the settling time from the start of the unshaped reference [s]; None if the arm does not settle."""
+        """Return the settling time from the unshaped reference's start [s]; None if the arm never settles."""
         try:
             return still_after(self.recording, self.rows, threshold)
         except NotMeasurableError:
@@ -119,7 +119,7 @@ class Measure:
 
 
 def _late(at: float | None, motion: MadeMotion) -> float | None:
-    """Convert a time [s] to the time after the unshaped reference's stop [ms], since moves have various lengths."""
+    """Convert a time [s] to the time after the unshaped reference's stop [ms], since moves vary in length."""
     return None if at is None else round(1e3 * (at - motion.unshaped.duration), 6)
 
 

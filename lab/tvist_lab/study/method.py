@@ -30,8 +30,8 @@ class Task:
     reference: Floats  # reference, shape (T, n) [rad]
     limits: MotionLimits = PAPER
     as_served: bool = False
-    """Whether to plan moves for the filter and accept the result, as a robot does. Otherwise the filter gets the
-    reference itself, and its output is checked for motion after the declared end."""
+    """Whether to plan moves for the filter and accept the result, as a robot does. Otherwise the filter gets
+    the reference itself, and its output is checked for motion after the declared end."""
     stream: bool = False  # whether the reference is a stream with unknown end
     ticks: int | None = None  # duration of the motion to compare with, if any
 
@@ -104,7 +104,7 @@ class Named(SampleMethod):
         return replace(found, elastic=elastic, law=self.recipe.friction(description, tvist))
 
     def shaped(self, task: Task) -> Shaped:
-        """Shape the reference; if the task is `as_served`, shape a motion planned for the filter, as a robot does."""
+        """Shape the reference; if `as_served`, shape a motion planned for the filter, as a robot does."""
         if task.stream or not task.as_served:
             return super().shaped(task)
         tvist, own = own_move(self.recipe, task.description, task.move, task.limits)
@@ -194,7 +194,7 @@ class StretchedDoubleS(Planned):
 
 @dataclass(frozen=True)
 class PeriodOfJerk(Planned):
-    """A double S whose jerk lasts a period of the lowest mode at the target, so that this mode is not excited."""
+    """A double S whose jerk lasts a period of the lowest mode at the target, so this mode is not excited."""
 
     recipe: Recipe
     name: str
@@ -209,7 +209,7 @@ class PeriodOfJerk(Planned):
 
 
 def _from_rest(tvist: Filter, task: Task) -> RunningFilter:
-    """Return a filter at rest at the start of a move; like a robot, tell it the target unless it is a stream."""
+    """Return a filter at rest at a move's start; like a robot, tell it the target unless it is a stream."""
     tvist.reset(np.array(task.move.start))
     tvist.aim(None if task.stream else np.array(task.move.target))
     return RunningFilter(tvist)

@@ -35,7 +35,7 @@ from tvist_shaping.taps import mean_delay
 
 CONFIGURATIONS = 150  # number of configurations over which the range of the lowest mode is determined
 SEARCHED = 2000
-"""Number of configurations searched for the longest mean delay; if one were missed, limits would be exceeded there."""
+"""Number of configurations searched for the longest mean delay; limits would be exceeded at a missed one."""
 
 Range = tuple[float, float]
 
@@ -127,7 +127,7 @@ class Recipe:
 def own_move(
     recipe: Recipe, description: RobotDescription, move: Move, limits: MotionLimits
 ) -> tuple[Filter, Floats]:
-    """Return the filter at the start of a move, and the move's reference within limits, shape (T, n) [rad]."""
+    """Return the filter at the start of a move and the move's reference within limits, shape (T, n) [rad]."""
     start, target = np.array(move.start), np.array(move.target)
     tvist = recipe.make(description, move.mass)
     tvist.reset(start)

@@ -48,7 +48,7 @@ class RunningShaper(Protocol):
 
 
 class RunningFilter:
-    """A filter in operation; if its shaper's function fails, it fails too, so that no result has old weights."""
+    """A filter in operation; if its shaper's function fails, it fails too, so no result has old weights."""
 
     def __init__(self, tvist: Filter) -> None:
         self._tvist = tvist
@@ -74,8 +74,8 @@ class RunningFilter:
 
 def shape(stepper: RunningShaper, reference: Floats, *, watched: bool) -> Shaped:
     """Apply a shaper to a reference, at rest at both ends, until the output rests at the target."""
-    # With `watched`, measure the shaper's processor time, and raise ShaperFaultError unless the output ends, keeps
-    # the declared delay, and does not move again later.
+    # With `watched`, measure the shaper's processor time, and raise ShaperFaultError unless the output ends,
+    # keeps the declared delay, and does not move again later.
     target, stop = reference[-1], len(reference) - 1
     q, cost = _through(stepper, reference, timed=watched)
     declared = [stepper.delay]

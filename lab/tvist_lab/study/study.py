@@ -90,8 +90,8 @@ class Study:
     notes: str = ""
     facts: Mapping[str, Any] = field(default_factory=dict)  # properties of the cases, for --json
     identity: Mapping[str, Any] = field(default_factory=dict)
-    """Data that determine the rows besides title, facts and version of tvist; stored rows with another identity
-    are not continued."""
+    """Data that determine the rows besides title, facts and version of tvist; stored rows with another
+    identity are not continued."""
 
     @property
     def shown(self) -> tuple[Column, ...]:

@@ -51,8 +51,8 @@ class Bench:
         reference = case.reference()
         self.task = Task(case.description, case.declared, reference, case.limits, job.as_served, case.stream)
         """Task of the first method."""
-        # The friction in the robot's calibration is fed forward for every method, shaped or not, unless the method
-        # sets another friction, `Shaped.law`.
+        # The friction in the robot's calibration is fed forward for every method, shaped or not, unless the
+        # method sets another friction, `Shaped.law`.
         recipes = (getattr(method, "recipe", None) for method in job.methods)
         law = next((recipe.friction(case.description) for recipe in recipes if recipe is not None), None)
         self._line = ControlLine(

@@ -1,4 +1,4 @@
-"""Measure for any arm, in the same way, how accurately it is identified and how much vibration is suppressed."""
+"""Measure, for any arm alike, how accurately it is identified and how much vibration is suppressed."""
 
 import asyncio
 from collections.abc import Callable
@@ -41,10 +41,10 @@ def measure(
 ) -> dict[str, Any]:
     """Measure an arm with gears and links `stiffness` times as stiff, by random `moves` with the rated payload.
 
-    Without a calibration, the arm is identified first. Returns the factor `stiffness`; `calibration`, its name or
-    "identified"; `f_d_error_percent`, the median error of each mode; the numbers of `moves`, of moves for which
-    the drives are `too_weak`, and of moves `counted` since they vibrate enough; `reduction_percent` of the peak
-    by `auto`; the median `delay_ms`; and `sag_error_percent`, see `sag_error`.
+    Without a calibration, the arm is identified first. Returns the factor `stiffness`; `calibration`, its
+    name or "identified"; `f_d_error_percent`, the median error of each mode; the numbers of `moves`, of moves
+    for which the drives are `too_weak`, and of moves `counted` since they vibrate enough; `reduction_percent`
+    of the peak by `auto`; the median `delay_ms`; and `sag_error_percent`, see `sag_error`.
     """
     arm = description if stiffness == 1.0 else stiffer(stiffness, description)
     known = asyncio.run(_identified(arm, seed)) if calibration is None else calibration
@@ -90,7 +90,7 @@ async def _identified(arm: RobotDescription, seed: int) -> Calibration:
 def sag_error(arm: RobotDescription, seed: int) -> float:
     """Compare gear twist at rest with g(q)/K at random configurations.
 
-    Returns the largest difference, relative to the largest twist in the same pose [%]; 0 if gravity loads no joint.
+    Returns the largest difference relative to the largest twist in the pose [%]; 0 if gravity loads no joint.
     """
     plant, rigid = FlexibleArm(arm.clean(), arm.payload), rigid_model(arm, arm.payload)
     data, stiffness = rigid.createData(), np.array(arm.drives.gear_stiffness)

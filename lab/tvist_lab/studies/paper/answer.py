@@ -9,7 +9,7 @@ POSES = {"Q1": "stretched out", "Q2": "stretched out to the side", "Q3": "folded
 
 
 def answer(report: dict[str, Any], motion: str) -> list[str]:
-    """Return lines of one or two sentences on the effect of shaping on one motion, and briefly on the others."""
+    """Return lines of one or two sentences on shaping's effect on one motion, and briefly on the others."""
     start, end = motion.split("-")
     change, longer = _change(report, motion), report["baselines"][motion]["shaped"]["delay_ms"]
     before, after = map(_number, (change.before, change.after))

@@ -37,7 +37,7 @@ class PaperMethod:
     jerk: float = JERK  # jerk limit of the motion [rad/s³]
 
     async def prepare(self, robot: Robot, arm: Arm, end: tuple[float, ...]) -> None:
-        """Set up a robot at rest for a motion that ends at a pose; even without a shaper, modes are recorded."""
+        """Set up a robot at rest for a motion ending at a pose; even without a shaper, modes are recorded."""
         modes = self.modes
         await arm.set_estimator("polynomial")
         if self.frozen:

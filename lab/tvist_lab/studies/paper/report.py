@@ -157,7 +157,7 @@ def table_2(table: dict[str, Any], digits: int) -> list[tuple[str, ...]]:
 
 
 def methods(result: dict[str, Any], motion: str, first: str) -> list[tuple[str, ...]]:
-    """Return rows of a motion's table of methods; `first`, such as "**{}**", formats the method earliest at rest."""
+    """Return rows of a motion's method table; `first`, such as "**{}**", formats the method first at rest."""
     rows = result["baselines"][motion]
     known = [row["still_after_ms"] for row in rows.values() if row["still_after_ms"] is not None]
     soonest = min(known, default=None)

@@ -61,7 +61,7 @@ async def _run(path: Path, seed: int, progress: Progress) -> Experiment:
 
 
 def _measure(done: Experiment, content: RecordingFile) -> tuple[bool, int]:
-    """Measure each motion in the recording; return whether live streams without loss agree, and states lost."""
+    """Measure each recorded motion; return whether live streams without loss agree, and states lost."""
     same, lost = True, 0
     for key, received in list(done.first.items()):
         ticks = received["tick"]
