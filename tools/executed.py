@@ -31,7 +31,7 @@ if "tests.nursery" in sys.orig_argv:
 elif "PYTEST_CURRENT_TEST" in os.environ:
     begin()
 """
-"""Code that each program started by a test runs first, or after a fork; an environment variable names the test."""
+"""Code that programs started by a test run first, or after a fork; an environment variable names the test."""
 
 
 def cover(folder: Path, *arguments: Annotated[str, Parameter(allow_leading_hyphen=True)]) -> None:

@@ -50,7 +50,7 @@ from tvist_shaping import BUILT_IN
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
 LIMITS = MotionLimits(1.5, 2.0, 100.0)
 SHOWN = (-0.12, 0.4)
-"""Start and end of the time shown in the figure of elastic feed-forward, from the unshaped reference's stop [s]."""
+"""Start and end time in the figure of elastic feed-forward, from the unshaped reference's stop [s]."""
 MODES = 3  # number of modes in the product of zero-vibration shapers
 TICKS_AFTER = 100  # ticks shown after the stop of the reference
 
@@ -74,7 +74,7 @@ def elastic_figure() -> Figure:
 
 
 def _stop(name: str) -> tuple[Floats, Floats, Floats]:
-    """Return time [ms], true tool acceleration [m/s²] and remaining angle of joint 1 [mrad] around the stop."""
+    """Return time [ms], true tool acceleration [m/s²] and joint 1's remaining angle [mrad] near the stop."""
     description = load("ur5e").clean()
     payload, calibration = paper_payload(description), load_calibration("ur5e_modal")
     start, end = (np.array(description.poses[pose]) for pose in ("Q1", "Q2"))

@@ -1,8 +1,9 @@
 """Draw mutants of the product's last commit, and check whether the tests of that commit find them.
 
 A mutant changes one operator, constant or branch. Before you run mutants, record with `tools.executed` which
-test executes which line. Lines in kernels and lines that run at import are not recorded. Their tests are those
-that execute a line which mentions the kernel or the assigned name, or if none does, any line of the file.
+test executes which line. Lines in kernels and lines that run at import are not recorded. Their tests are
+those that execute a line which mentions the kernel or the assigned name, or if none does, any line of the
+file.
 """
 
 import ast
@@ -46,7 +47,7 @@ app = App(name="python -m tools.mutants", help=__doc__)
 
 
 def walk(node: ast.AST, owner: str, hidden: bool, span: tuple[int, int]) -> Iterator[tuple[ast.AST, Mutant]]:
-    """Yield all nodes that run, each with its function or variable, whether coverage misses it, and its lines."""
+    """Yield nodes that run, each with its function or variable, whether coverage misses it, and its lines."""
     if isinstance(node, ast.JoinedStr) or (isinstance(node, ast.If) and "TYPE_CH" in ast.unparse(node.test)):
         return  # positions in f-strings are wrong before Python 3.12
     if isinstance(node, ast.stmt):

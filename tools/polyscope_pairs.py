@@ -1,9 +1,10 @@
 """Compare translations of PolyScope's programs with its exports: `python -m tools.polyscope_pairs FOLDER [SECONDS]`.
 
-For each .urp file beside a .script file, translation and export run in lockstep from the first waypoint, with the
-TCP and the installation's variables of the export, for at most SECONDS of robot time. URCaps' nodes are left out of
-both, since exports contain the URCaps' own programs. Translation and export agree if they move the arm along the
-same path: their references in moving ticks differ by at most 1e-6 rad, over the length of the shorter run.
+For each .urp file beside a .script file, translation and export run in lockstep from the first waypoint, with
+the TCP and the installation's variables of the export, for at most SECONDS of robot time. URCaps' nodes are
+left out of both, since exports contain the URCaps' own programs. Translation and export agree if they move
+the arm along the same path: their references in moving ticks differ by at most 1e-6 rad, over the length of
+the shorter run.
 """
 
 import re
@@ -51,7 +52,7 @@ def translated(program: Path, export: str) -> str:
 
 
 def travelled(text: str, start: str, seconds: float) -> tuple[Floats, str]:
-    """Run a program; return the references of ticks in which the arm moves, shape (T, n) [rad], and how it ended."""
+    """Run a program; return the references of moving ticks, shape (T, n) [rad], and how the program ended."""
     with TemporaryDirectory() as folder:
         file = Path(folder, "run.mcap")
         setup = free_setup(profile="ursim", floor=False, start=start or None)

@@ -81,7 +81,7 @@ def _parts(kind: type) -> Iterator[tuple[str, str]]:
 
 
 def _written(head: str, doc: str | None) -> str:
-    """Format a class's, method's or attribute's header with its docstring; wrap long headers before parameters."""
+    """Format a class, method or attribute header with its docstring; wrap long headers before parameters."""
     is_class, is_method = head.startswith("class "), head.endswith(":") and head.startswith(" ")
     whole = re.sub(r"(?<!,) | (?!\w+: |\*,)", "\0", head + " ..." * (is_method and doc is None))
     text = "\n" * is_class + fill(whole, 110, subsequent_indent=" " * 8).replace("\0", " ") + "\n"

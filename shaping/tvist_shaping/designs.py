@@ -15,12 +15,13 @@ LONGEST = 0.26  # longest total time of these shapers, unless the design is slow
 class TargetDesign(Design):
     """Zero-vibration shapers for the modes at a known end of a motion, and another design for other motions.
 
-    With a known end the weights do not change during a motion, so different ends may have different mean delays. If all
-    ends had the same mean delay, a lightly damped arm would lose most of the reduction of its vibration.
+    With a known end the weights do not change during a motion, so different ends may have different mean
+    delays. If all ends had the same mean delay, a lightly damped arm would lose most of the reduction of its
+    vibration.
     """
 
     def __init__(self, design: ShortDesign, slower: float = 1.0) -> None:
-        """Create a design from one that no other filter uses; `slower` multiplies all times, for a slow arm."""
+        """Create a design from one used by no other filter; `slower` multiplies all times, for a slow arm."""
         self.name, self.modes, self.period = design.name, design.modes, design.period
         self.taps = math.ceil(LONGEST * slower / self.period) + 3
         self._design = design
@@ -89,7 +90,7 @@ class ConstantDesign(Design):
 
 
 def running_means(*ticks: int) -> Floats:
-    """Return the weights of running means in series, each over a number of ticks, shape (sum - count + 1,)."""
+    """Return weights of running means in series, each over a number of ticks, shape (sum - count + 1,)."""
     weights: Floats = np.ones(1)
     for count in ticks:
         weights = np.convolve(weights, np.full(count, 1.0 / count))

@@ -1,13 +1,15 @@
 """Extra-insensitive shapers that are exact with damping: humps of height V, and V at f_d if a hump is there.
 
-`ripple` computes the undamped shapers. With their amplitudes multiplied by K^j for damping, they leave less than V, but
-in a band that is narrower than possible. Here the conditions are solved with damping. With N = humps + 2 impulses,
-T_d = 1, s = 2π(ζ/√(1-ζ²) + i), c = Re s, and r the ratio of true to design frequency,
+`ripple` computes the undamped shapers. With their amplitudes multiplied by K^j for damping, they leave less
+than V, but in a band that is narrower than possible. Here the conditions are solved with damping.
+With N = humps + 2 impulses, T_d = 1, s = 2π(ζ/√(1-ζ²) + i), c = Re s, and r the ratio of true to design
+frequency,
 
     E(r) = Σ A_j exp(r (s τ_j - c τ_N))    (|E| is the residual of `sensitivity`)
 
-has N - 1 zeros E = 0 and between them N - 2 humps |E| = V, d|E|/dr = 0; the middle zero or hump of them is at r = 1.
-Together with ΣA = 1 there are as many equations as unknowns A_j, τ_j and r. They are solved from zero damping upwards.
+has N - 1 zeros E = 0 and between them N - 2 humps |E| = V, d|E|/dr = 0; the middle zero or hump of them is at
+r = 1. Together with ΣA = 1 there are as many equations as unknowns A_j, τ_j and r. They are solved from zero
+damping upwards.
 
 As damping increases, the highest zero moves to infinity; a shaper's range ends when this zero is at 1.8 times the
 design frequency. (Cubic fits in ζ for two and three humps have been published and are used in printer firmware, valid
@@ -29,7 +31,7 @@ HIGHEST_ZERO = 1.8  # largest permitted ratio of the highest zero to the design 
 
 
 class HumpShaper(Tabulated):
-    """Shaper with some humps of height V, for damping ratios below `zeta_max`; None for the highest possible."""
+    """Shaper with humps of height V, for damping ratios below `zeta_max`; None for the highest possible."""
 
     def __init__(self, humps: int, V: float, instead: str = "", zeta_max: float | None = None) -> None:
         self.V, self.N = V, humps + 2

@@ -53,10 +53,11 @@ def blend(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops 
 ) -> tuple[float, float, float]:
     """Compute one tick of a fade, and return its s, ṡ and s̈; s is 1 when the fade is complete.
 
-    `old` and `new` are the filters' outputs at the last three ticks, the present one last [rad], shape (3, joints), and
-    `out` the fade's, whose last row is written. `progress` is what the previous tick returned: s [-], ṡ [1/s] and s̈
-    [1/s²]. `limits` are the velocity [rad/s], acceleration [rad/s²] and jerk [rad/s³] of every joint. `lag` is how much
-    longer the new filter's mean delay is than the old one's [s], and the rate of change of this difference [-].
+    `old` and `new` are the filters' outputs at the last three ticks, the present one last [rad], shape
+    (3, joints), and `out` the fade's, whose last row is written. `progress` is what the previous tick
+    returned: s [-], ṡ [1/s] and s̈ [1/s²]. `limits` are the velocity [rad/s], acceleration [rad/s²] and jerk
+    [rad/s³] of every joint. `lag` is how much longer the new filter's mean delay is than the old one's [s],
+    and the rate of change of this difference [-].
     """
     share, rate, slope = progress
     velocity, acceleration, jerk = limits
@@ -78,7 +79,7 @@ def blend(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops 
     left, push = 1.0 - share, PUSH * jerk / widest
     safe = min(2.0 / QUICKEST, 0.5 * push ** (1.0 / 3.0) * (6.0 * left) ** (2.0 / 3.0))
     safe = min(safe, min(jerk / acceleration, 0.2 / period) * left)
-    # Room: acceleration that is left after one more tick at the jerk limit, which is assumed to use half at most.
+    # Room: acceleration left after one more tick at the jerk limit, which is assumed to use half at most.
     counted = acceleration - max(MARGIN * acceleration, min(jerk * period, 0.5 * acceleration))
     # Bounds for stopping s after the motion has taken the room away, and for moving s without room.
     brake, closed, coast, back = math.inf, math.inf, math.inf, math.inf

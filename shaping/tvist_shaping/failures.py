@@ -27,7 +27,7 @@ def words(error: BaseException) -> str:
 
 
 def _place(error: BaseException) -> str:
-    """Return as a phrase where a user's file raised an error: file and last line of the first file outside ours."""
+    """Return in words where a user's file raised an error: first file outside ours, and last line in it."""
     lines: dict[str, int] = {}
     for frame, line in walk_tb(error.__traceback__):
         file = frame.f_code.co_filename

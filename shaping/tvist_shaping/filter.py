@@ -149,7 +149,7 @@ class TvistFilter(Filter):
         self._suppress(modes)
 
     def _modes(self) -> tuple[Floats, Floats]:
-        """Return the modes; if they may change abruptly, smooth them by a low-pass, so that limits are kept."""
+        """Return the modes; if they may change abruptly, smooth them by a low-pass to keep the limits."""
         modes = super()._modes()
         if not self.estimator.abrupt:
             return modes

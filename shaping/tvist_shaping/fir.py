@@ -113,8 +113,8 @@ def solve(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops 
 ) -> bool:
     """Compute the weights for given modes, length [s] and mean delay [s].
 
-    Store the result in `dual`, `taps` and `remains` of the programme. Return whether the programme was solved;
-    otherwise the taps are the best ones found.
+    Store the result in `dual`, `taps` and `remains` of the programme. Return whether the programme was
+    solved; otherwise the taps are the best ones found.
     """
     spread, weight, dual, taps, remains, rows, columns, hessian = programme
     R, N, modes = dual.shape[0], taps.shape[0], f_d.shape[0]

@@ -111,7 +111,7 @@ def custom(
 ) -> Shaper:
     """Create a shaper from your own impulses.
 
-    For a mode of another frequency than f_d, the times are scaled; the amplitudes are the same at any damping.
+    For a mode of another frequency than f_d, times are scaled; the amplitudes are the same at any damping.
 
     Args:
         name: Name of the shaper.

@@ -26,7 +26,7 @@ AnyShaper: TypeAlias = Shaper | FirShaper  # types that a user's own shaper may 
 SLOW_HZ = 5.5
 """If an arm's lowest frequency is below this [Hz], the designs' times grow with the longest period."""
 LIGHT = 0.040
-"""If ZV shapers of the two lowest modes have a longer mean delay than this at q = 0 [s], the designs' times grow, too.
+"""If ZV shapers of the two lowest modes have a mean delay above this at q = 0 [s], the designs' times grow.
 
 The less an arm is damped, the later its weights have to be.
 """
@@ -51,8 +51,8 @@ DESIGNS: Mapping[str, Callable[[float], Design]] = MappingProxyType(
 )
 """Designs with constant mean delay for an arm's four lowest modes; the argument is the factor of their times.
 
-`auto` has a smaller residual, `short` is shorter, `auto-target` is for motions with a known end, and `elastic-auto`
-removes the vibration that elastic feed-forward leaves.
+`auto` has a smaller residual, `short` is shorter, `auto-target` is for motions with a known end, and
+`elastic-auto` removes the vibration that elastic feed-forward leaves.
 """
 SMOOTHED: Mapping[str, FeedForward] = MappingProxyType(
     {"elastic": "elastic", "elastic-position": "elastic-position"}

@@ -44,8 +44,9 @@ def residual(f: npt.ArrayLike, zeta: float, impulses: Impulses) -> Floats:
 def band(impulses: Impulses, f_d: float, zeta: float, V: float) -> tuple[float, float]:
     """Return the lowest and highest damped frequency around f_d at which the residual is at most V [Hz].
 
-    The band is searched on a grid of f_d/1000 up to 10 f_d, and its ends are refined by bisection; a hump that touches
-    V is inside. If 10 f_d is inside, the highest frequency is infinite; if f_d is outside, both are NaN.
+    The band is searched on a grid of f_d/1000 up to 10 f_d, and its ends are refined by bisection; a hump
+    that touches V is inside. If 10 f_d is inside, the highest frequency is infinite; if f_d is outside, both
+    are NaN.
 
     Args:
         impulses: Impulses of the shaper.
@@ -71,7 +72,7 @@ def band(impulses: Impulses, f_d: float, zeta: float, V: float) -> tuple[float, 
 
 
 def _end(grid: Floats, zeta: float, impulses: Impulses, limit: float) -> float:
-    """Return where the residual first exceeds the limit along a grid; at the first point it is below the limit."""
+    """Return where a residual first exceeds the limit on a grid; at the first point it is below the limit."""
     outside = np.flatnonzero(residual(grid, zeta, impulses) > limit)
     if outside.size == 0:
         return math.inf

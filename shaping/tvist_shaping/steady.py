@@ -28,7 +28,7 @@ DESIGN_TICKS = 4  # ticks between two designs
 SMOOTH = 64
 """Ticks of each running mean: with fewer, the variance of the delays changes too fast; with more, taps lag."""
 EXCESS = 0.005
-"""Largest share by which the shaped acceleration exceeded the reference's, in random motions at their limits [-]."""
+"""Largest share by which shaped acceleration exceeded the reference's in random motions at the limits [-]."""
 
 
 class Design(Forked, ABC):
@@ -272,7 +272,7 @@ class SteadyFilter(Filter):
 
 
 class AimedFilter(SteadyFilter):
-    """Filter whose weights fit the modes at a motion's known end, since the arm vibrates there after the motion.
+    """Filter whose weights fit the modes at a motion's known end, where the arm vibrates after the motion.
 
     Constant weights cannot exceed the limits of the reference, need no averaging, and do not lag behind the arm, but
     they fit less well during the motion. If no end is known, as in a stream, the filter behaves like a `SteadyFilter`.

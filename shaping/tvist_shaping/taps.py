@@ -29,8 +29,8 @@ def mean_delay(f_d: Floats, zeta: Floats) -> float:
 def product_taps(f_d: Floats, zeta: Floats, mean: float, period: float, taps: Floats) -> bool:
     """Compute the product of the modes' zero-vibration shapers, delayed to a mean delay [s].
 
-    If the product's own mean delay is longer than `mean`, keep the product's. Move impulses beyond the last tap to the
-    last tap. Return False in either case.
+    If the product's own mean delay is longer than `mean`, keep the product's. Move impulses beyond the last
+    tap to the last tap. Return False in either case.
     """
     modes, N = f_d.shape[0], taps.shape[0]
     own = mean_delay(f_d, zeta)

@@ -17,7 +17,7 @@ def move(
     qd: Floats,  # q̇_r
     torque: Floats,  # feed-forward, shape (n,) [N m]
 ) -> None:
-    """Move the arm by one period, in which the drives' commands change linearly from the previous to the given ones."""
+    """Move the arm by a period, in which drives' commands change linearly from the last to the given ones."""
     arm = parts(memory)
     now = arm.commands[NOW]
     for j in range(q.shape[0]):
@@ -57,11 +57,12 @@ def evaluate(
 
 @compiled
 def read(arm: ArmMemory, step: float, out: Floats) -> None:
-    """Read encoders and accelerometer into `out`. Encoder readings change only by at least a step, so none flickers."""
+    """Read encoders and accelerometer into `out`."""
     links, n, qdd = arm.qdd.shape[0], arm.joints.shape[1], arm.qdd
     y, v = arm.state[0], arm.state[1]
     for j in range(n):
         l = int(of_joint(arm.joints, j).link)
+        # Encoder readings change only by at least a step, so that none flickers.
         if not abs(y[l] - arm.readings[j]) < step:  # True for NaN
             arm.readings[j] = y[l]
         out[j], out[n + j] = arm.readings[j], v[l]
@@ -95,7 +96,7 @@ def play(
     measured: Floats,  # result, as in `evaluate`, shape (T, 3n+3)
     flange: Floats,  # result: its rotation and position after each period, shape (T, 12)
 ) -> int:
-    """Compute T periods as `tick` does; return T, or the number of periods before the state stopped being finite."""
+    """Compute T periods as `tick` does; return T, or their number before the state stopped being finite."""
     T: int = commands.shape[0]
     for k in range(T):
         if not tick(memory, commands[k, 0], commands[k, 1], commands[k, 2], measured[k]):

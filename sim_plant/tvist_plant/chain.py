@@ -98,7 +98,7 @@ def start(R: Floats, o: Floats) -> None:
 
 @compiled
 def twist(R: Floats, o: Floats, S: Floats) -> None:
-    """Compute the twist of a unit velocity about a frame's z axis: angular, then linear at the base origin."""
+    """Compute the twist of unit velocity about a frame's z axis: angular, then linear at the base origin."""
     x, y, z = R[0, 2], R[1, 2], R[2, 2]
     S[0], S[1], S[2] = x, y, z
     S[3], S[4], S[5] = o[1] * z - o[2] * y, o[2] * x - o[0] * z, o[0] * y - o[1] * x
@@ -207,7 +207,7 @@ def along(S: Floats, F: Floats) -> float:
 
 @compiled
 def collect_torques(scratch: Floats, torque: Floats) -> None:
-    """Compute the joint torques after a sweep [N m]; each F in the scratch then includes those of all outer bodies."""
+    """Compute joint torques after a sweep [N m]; each F in the scratch then includes all outer bodies' F."""
     for i in range(torque.shape[0] - 1, -1, -1):
         F = scratch[i, 22:28]
         torque[i] = along(scratch[i, :6], F)
@@ -228,7 +228,7 @@ def collect_gravity(scratch: Floats, gravity: float, torque: Floats) -> None:
 
 @compiled
 def collect_inertia(scratch: Floats, M: Floats) -> None:
-    """Compute the upper triangle of M after a sweep [kg m^2]; inertias in the scratch then include all outer bodies."""
+    """Compute M's upper triangle after a sweep [kg m²]; inertias in `scratch` then cover all outer bodies."""
     W = np.empty(6)
     for k in range(M.shape[0] - 1, -1, -1):
         inertia = scratch[k, 6:16]

@@ -67,7 +67,7 @@ class JointParameters(NamedTuple, Generic[T]):
 def joint_parameters(
     description: RobotDescription, imperfections: Imperfections, links: Integers | int = 0
 ) -> JointParameters[Floats]:
-    """Return the parameters of an arm, with phases 0; raise ValueError unless lists have one value per joint."""
+    """Return an arm's parameters, with phases 0; raise ValueError unless lists have one value per joint."""
     n, drives, limit = description.joints, description.drives, np.array(description.limits.torque)
     K, K_d, K_p, K_i = map(
         np.array,
@@ -126,7 +126,7 @@ def springs_and_dampers(
 ) -> tuple[Floats, Floats]:
     """Return stiffness [N m/rad] and damping [N m s/rad] of N links, then n motors, shape (N+n, N+n) each.
 
-    Both matrices are the same in every posture, and include the drives' gains and the slope of friction at rest.
+    Both matrices are the same in any posture and include the drives' gains and the slope of friction at rest.
     """
     size, link = flexible.model.nv, flexible.joints
     motor = size + np.arange(len(link))

@@ -53,7 +53,7 @@ def combined(description: RobotDescription, more: Imperfections | None) -> Imper
 class FlexibleArm(SimulatedArm):
     """A flexible arm and its drives: a `Plant` with pushes, payload changes, a fault and vibration modes.
 
-    `imperfections` override those of the robot file. `carries` maps each declared payload to the one truly carried.
+    `imperfections` override the robot file's. `carries` maps each declared payload to the one truly carried.
     """
 
     def __init__(
@@ -144,7 +144,7 @@ class FlexibleArm(SimulatedArm):
         self._s[:] = np.divide(wanted, gain, out=np.zeros_like(wanted), where=gain > 0.0)
 
     def step(self, command: DriveCommand) -> Measurement:
-        """Move the arm by one period, in which the drives' commands change linearly from the previous to this one."""
+        """Move the arm by a period, in which drives' commands change linearly from the last to this one."""
         if self._outside.rests:
             out = np.empty(self._width)
             finite = tick(self.memory, command.q, command.qd, command.torque, out)
@@ -167,7 +167,7 @@ class FlexibleArm(SimulatedArm):
         return replace(response, measured=replace(response.measured, accelerometer=noisy))
 
     def held(self) -> Callable[[int], Response]:
-        """Save the present state; return a function that computes the response if the drives hold the last position."""
+        """Save the state; return a function that computes the response if drives hold the last position."""
         memory = self.memory.copy()
         command = parts(memory).commands[NOW].copy()
         command[1] = 0.0
@@ -208,9 +208,10 @@ class FlexibleArm(SimulatedArm):
     ) -> None:
         """Apply a force [N] and a moment about the point [N m] to one of `bodies` until changed or reset.
 
-        The wrench replaces the previous one on this body, and adds to those on other bodies and to `push`; zeros end
-        it. It is in world axes and does not turn with the body. The point [m] is in the body's frame, which is that of
-        its joint or the flange. Raise ValueError for an unknown body or anything but three finite numbers.
+        The wrench replaces the previous one on this body, and adds to those on other bodies and to `push`;
+        zeros end it. It is in world axes and does not turn with the body. The point [m] is in the body's
+        frame, which is that of its joint or the flange. Raise ValueError for an unknown body or anything but
+        three finite numbers.
         """
         self._outside.push_body(body, force, moment, point)
 

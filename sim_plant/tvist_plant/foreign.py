@@ -1,4 +1,4 @@
-"""Wrappers of users' plants: add missing methods, check results, and raise only `PlantError`, which stops one robot."""
+"""Wraps users' plants: adds missing methods, tests results, raises only PlantError, which stops one robot."""
 
 import math
 from collections.abc import Callable
@@ -28,12 +28,12 @@ def is_plant(value: object) -> bool:
 
 
 def arm_of(plant: Plant) -> Plant:
-    """Return the plant; if it derives from no class of `tvist_plant.plant`, return a wrapper that has all methods."""
+    """Return the plant, or if it derives from no class of `tvist_plant.plant`, a wrapper with all methods."""
     return plant if isinstance(plant, SimulatedArm | RealArm) else called(plant, None)
 
 
 def called(plant: Plant, joints: int | None, *, untold: bool = False) -> Plant:
-    """Return a wrapper that turns exceptions into `PlantError` (not if joints is None); `untold` hides the truth."""
+    """Return a wrapper turning exceptions into PlantError unless joints is None; `untold` hides the truth."""
     members: dict[str, Any] = {
         name: _method(name)
         for name in _METHODS

@@ -11,16 +11,16 @@ A gear twisted by δ transmits the torque
     K δ + z                               with hysteresis, ż = r K δ̇ - |δ̇| z r K/z_max  (Dahl 1968);
     0 up to |δ| = b                       with backlash: the laws above then hold for the twist beyond b.
 
-Near standstill, stiction holds a motor by a torque d in addition to F(v). This torque grows with the angle θ like a
-spring until the motor breaks away (Dahl 1968; Stribeck 1902):
+Near standstill, stiction holds a motor by a torque d in addition to F(v). This torque grows with the angle θ
+like a spring until the motor breaks away (Dahl 1968; Stribeck 1902):
 
     dd/dθ = σ K (1 - d sgn(θ̇)/most),    most = (F_s + μ_s |τ_g|) exp(-(θ̇/v_s)²)
 
 τ_g is the gear's torque, K its stiffness; this F_s and v_s are those of `stiction`.
 
-A gear's damper also acts within its backlash, as oil and teeth do. A yielding base turns on springs about the world's
-x and y axes and carries a ring with mass under the arm. A tilted arm leans in the world, and its controller does not
-know that; the truth is given in the upright world.
+A gear's damper also acts within its backlash, as oil and teeth do. A yielding base turns on springs about the
+world's x and y axes and carries a ring with mass under the arm. A tilted arm leans in the world, and its
+controller does not know that; the truth is given in the upright world.
 """
 
 import numpy as np
@@ -38,7 +38,7 @@ STICTION = frozenset({"stiction", "stiction_load", "stiction_speed", "stiction_s
 def imperfect_model(
     description: RobotDescription, payload: Payload, imperfections: Imperfections
 ) -> FlexibleModel:
-    """Model an arm whose links may twist and whose base may yield or lean; raise ValueError if no link can twist."""
+    """Model an arm: its links may twist and its base may yield or lean; ValueError if no link can twist."""
     if imperfections.torsion is not None and not description.link_flexibility.links:
         raise ValueError(
             f"torsion is {imperfections.torsion:g} N m/rad, but no link of the {description.robot.model} bends: "

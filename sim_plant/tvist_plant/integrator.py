@@ -225,7 +225,7 @@ def advance(arm: ArmMemory, head: Floats) -> None:  # noqa: C901, PLR0912, PLR09
 
 @compiled
 def balance(arm: ArmMemory, moment: Floats) -> None:
-    """Compute link accelerations (`arm.qdd`) and motor torques (`moment`, shape (n,) [N m]) in the present state."""
+    """Compute link accelerations `arm.qdd` and motor torques (`moment`, (n,) [N m]) in the present state."""
     n, links, qdd = arm.joints.shape[1], arm.qdd.shape[0], arm.qdd
     y, v, s, z = arm.state[0], arm.state[1], arm.state[3], arm.state[4]
     command, M, springs, S = arm.commands[NOW], arm.dynamics[NOW], arm.springs, arm.factor

@@ -39,7 +39,7 @@ class FlexibleModel:
     bare: pin.Inertia  # body of the last joint, without payload
 
     def carry(self, payload: Payload) -> None:
-        """Change the payload in place, since a new model takes half a tick; results are equal up to rounding."""
+        """Change the payload in place, as a new model takes half a tick; results are equal up to rounding."""
         place = self.model.frames[self.flange].placement
         self.model.inertias[self.model.njoints - 1] = (
             self.bare + place.act(payload_inertia(payload)) if payload.mass > 0.0 else self.bare

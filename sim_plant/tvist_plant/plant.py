@@ -300,7 +300,7 @@ class SimulatedArm(Plant):
 
 
 class RealArm(Plant):
-    """A plant that cannot be placed. It may have its own controller: watched (`sight`) or moved by tvist (`seen`)."""
+    """Plant that cannot be placed. It may have a controller: watched (`sight`) or moved by tvist (`seen`)."""
 
     def measure(self) -> Measurement:
         """Return the present measurements without moving the arm.
@@ -312,12 +312,12 @@ class RealArm(Plant):
 
     @property
     def watched(self) -> bool:
-        """Whether the arm's own controller moves the arm: commands have no effect, and `step` only measures."""
+        """Whether the arm's own controller moves the arm: commands have no effect; `step` only measures."""
         return self.can(RealArm.sight) and self.can(Plant.wait)
 
     @property
     def supervised(self) -> bool:
-        """Whether tvist moves the arm through the arm's own controller, which follows set-points and may stop."""
+        """Whether tvist moves the arm via the arm's own controller, which follows set-points and may stop."""
         needed = (RealArm.seen, RealArm.described, Plant.wait, Plant.switch, Plant.stop)
         return all(self.can(method) for method in needed)
 

@@ -39,7 +39,7 @@ def is_real_body(inertia: Tensor) -> bool:
 
 
 def lacking_inertia(inertia: Tensor) -> float:
-    """Return how much the principal moments lack to be physically possible; 0 if they are possible [kg m^2]."""
+    """Return how much principal moments lack to be physically possible; 0 if they are possible [kg m^2]."""
     least, middle, most = np.linalg.eigvalsh(matrix(inertia)).tolist()
     if least >= -1e-9 * most and most <= (least + middle) * (1.0 + 1e-6):
         return 0.0
@@ -64,7 +64,7 @@ def _names(description: RobotDescription) -> Iterator[str]:
 
 
 def _joints(description: RobotDescription) -> Iterator[str]:
-    """Check that there is one entry per joint, and that link frames and bending links are given in only one way."""
+    """Check that each joint has one entry, and link frames and bending links are given in only one way."""
     joints, kinematics, flexible = description.joints, description.kinematics, description.link_flexibility
     if not 1 <= joints <= MAX_JOINTS:
         yield f"robot.joints has {joints} names: must be 1 to {MAX_JOINTS}"

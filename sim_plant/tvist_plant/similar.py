@@ -101,10 +101,10 @@ class Scale:
         return own
 
     def link_flexibility(self, kinematics: Kinematics) -> dict[str, Any]:
-        """Return the table `link_flexibility`: long links between first joint and wrist bend as those of the UR5e do.
+        """Return the table `link_flexibility`: long links between first joint and wrist bend like the UR5e's.
 
-        Only links with DH parameters bend. A link is long if it mainly extends along x; the first long link bends
-        like the UR5e's upper arm, the others like its forearm.
+        Only links with DH parameters bend. A link is long if it mainly extends along x; the first long link
+        bends like the UR5e's upper arm, the others like its forearm.
         """
         own = _measured().link_flexibility
         joints = len(self.torque) if kinematics.a else 0

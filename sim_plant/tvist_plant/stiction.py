@@ -9,7 +9,7 @@ MIN_TORQUE = 1e-9  # remaining stiction of a fast motor, to avoid a division by 
 
 @compiled
 def relaxed(z: float, way: float, stiffness: float, most: float) -> float:
-    """Return Dahl's friction (1968), z before a travel, after it: dz/dx = k (1 - z sgn(ẋ)/most), solved exactly."""
+    """Return Dahl's friction (1968) after a travel (z before): exact for dz/dx = k (1 - z sgn(ẋ)/most)."""
     end = most if way > 0.0 else -most
     return float(end + (z - end) * math.exp(-stiffness * abs(way) / most))
 
@@ -27,7 +27,7 @@ def stiction_after(
 ) -> float:
     """Return the stiction d of a motor after it has turned, see `Imperfections` [N m].
 
-    Stiction dissipates d²/most per angle, so it never returns more energy than it stored, however `most` changes.
+    Stiction dissipates d²/most per angle: it returns no more energy than it stored, however `most` changes.
     """
     slow = speed / stiction_speed
     most = (stiction + stiction_load * abs(load)) * math.exp(-slow * slow) + MIN_TORQUE

@@ -76,7 +76,7 @@ def _named(element: Element) -> str:
 
 
 def _check_numbers(root: Element) -> None:
-    """Check the numbers of all elements that are read, and rewrite them in a form that every parser accepts."""
+    """Check numbers of all elements that are read, and rewrite them in a form that every parser accepts."""
     for (kind, at), keys in NUMBERS.items():
         for element in root.findall(kind):
             for part, (key, default) in product(element.findall(at), keys.items()):

@@ -134,7 +134,7 @@ def _sharper(share: float, description: RobotDescription, _seed: int) -> RobotDe
 def rubbed(
     factors: Mapping[str, float | tuple[float, ...]], description: RobotDescription, _seed: int = 0
 ) -> RobotDescription:
-    """Return the arm with stiction, friction and other imperfections multiplied by factors such as `HEAVIER`."""
+    """Return the arm with stiction, friction and other imperfections times factors such as `HEAVIER`."""
     own = {"coulomb_friction": description.drives.coulomb_friction, **description.imperfections.given()}
     new = {name: (np.array(value) * factors.get(name, 1.0)).tolist() for name, value in own.items()}
     drives = structs.replace(description.drives, coulomb_friction=tuple(new.pop("coulomb_friction")))
@@ -165,7 +165,7 @@ def _unlike(description: RobotDescription, seed: int) -> RobotDescription:
 
 
 def _all_at_once(description: RobotDescription, seed: int) -> RobotDescription:
-    """Return an arm with scattered springs, and with friction that changes sign within half the speed range."""
+    """Return an arm with scattered springs, and friction that changes sign within half the speed range."""
     return _off(SCATTER, 61, _sharper(0.5, description, seed), seed, SPRINGS)
 
 
@@ -273,7 +273,7 @@ def hidden_variant(seed: int) -> Variant:
 
 
 def scattered(share: float) -> Variant:
-    """Return an arm whose stiffness and gains (gears, links, loops) are raised or lowered at random by a share."""
+    """Return an arm with stiffness and gains (gears, links, loops) raised or lowered at random by a share."""
     if share == 0.0:
         return AS_DESCRIBED
     percent = f"{100.0 * share:g}"

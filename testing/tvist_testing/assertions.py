@@ -182,8 +182,9 @@ def _each(name: str, given: float | Sequence[float] | None, own: Sequence[float]
 def settling(rows: "Sequence[HistoryRow]", band: float) -> tuple[float, float]:
     """Return when the flexible arm's flange has settled within `band` [m], and its largest distance.
 
-    The time counts from the stop [s], and is infinite if the flange did not settle while observed; the distance
-    [m] is from its final position. `rows` start at the stop of the reference and last longer than `TAIL`.
+    The time counts from the stop [s], and is infinite if the flange did not settle while observed; the
+    distance [m] is from its final position. `rows` start at the stop of the reference and last longer than
+    `TAIL`.
     """
     stop, end = rows[0].time, rows[-1].time
     tail = [row.pose for row in rows if row.time > end - TAIL]

@@ -151,7 +151,7 @@ def described() -> list[str]:
 
 
 def combined(item: pytest.Item) -> Part:
-    """Return what the markers of a test describe; of a repeated marker only the nearest counts, but all faults do."""
+    """Return what a test's markers describe; of repeated ones, only the nearest counts, but all faults do."""
     found: Part = {}
     for name, function in MARKERS.items():
         if name != FAULTS and (marker := item.get_closest_marker(name)) is not None:

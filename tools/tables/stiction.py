@@ -1,4 +1,4 @@
-"""Show how exactly stiction must be known: move `ur5e_stiction` by controllers with wrong friction parameters."""
+"""Show how exactly stiction must be known: move `ur5e_stiction` by controllers with wrong friction values."""
 
 from functools import partial
 

@@ -11,7 +11,7 @@ _NAME = re.compile(r"(?!.*(^|\.)\d+$)[A-Za-z0-9_-]+(\.[A-Za-z0-9_-]+)*")
 
 
 class AllowedHosts:
-    """IP addresses, networks and host names that programs may connect to. An invalid entry raises StartError."""
+    """IP addresses, networks and host names that programs may connect to; StartError if any is invalid."""
 
     def __init__(self, given: Sequence[str]) -> None:
         self._names, self._networks = set(given), list[ipaddress.IPv4Network | ipaddress.IPv6Network]()

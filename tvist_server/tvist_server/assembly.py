@@ -31,7 +31,7 @@ class Share:
 
     numbers: range  # indices of these robots in the list of all robots
     router: str | None = None
-    """Endpoint of the process that clients connect to; None if this process itself has the configured endpoints."""
+    """Endpoint of the process that clients connect to; None if this process has the configured endpoints."""
 
 
 def shares(robots: int, workers: int) -> list[range]:
@@ -41,7 +41,7 @@ def shares(robots: int, workers: int) -> list[range]:
 
 
 def check_together(config: ServeConfig, robots: int) -> None:
-    """Raise StartError for an invalid duration, folder, host or input, or for options that exclude each other."""
+    """Raise StartError for an invalid duration, folder, host or input, or options that exclude each other."""
     config.keep_ticks()
     config.dump_folder()
     config.program_folder(config.name)
@@ -85,7 +85,7 @@ def make_robot(
 
 
 def security_of(config: ServeConfig, names: Sequence[str]) -> tuple[list[str], dict[str, Any]]:
-    """Return the endpoints to listen on and the settings that protect them; StartError if that is impossible."""
+    """Return endpoints to listen on and the settings that protect them; StartError if that is impossible."""
     check_endpoints("connect", config.connect)
     # The router checks the certificates of clients that reach the robot through it.
     return server_security(
@@ -98,7 +98,7 @@ def security_of(config: ServeConfig, names: Sequence[str]) -> tuple[list[str], d
 
 
 def ur_interfaces(robot: ServedRobot, config: ServeConfig, number: int) -> "UrInterfaces":
-    """Create the UR interfaces of robot `number`; StartError if other machines could reach them unprotected."""
+    """Create UR interfaces of robot `number`; StartError if other machines could reach them unprotected."""
     from tvist_server.gateways.ur.interfaces import UrInterfaces
     from tvist_server.gateways.ur.rtde.variables import matching
 
@@ -120,7 +120,7 @@ def ur_interfaces(robot: ServedRobot, config: ServeConfig, number: int) -> "UrIn
 
 
 def check_paces(config: ServeConfig, robots: Sequence[ServedRobot]) -> None:
-    """If a plant starts the ticks itself, raise StartError if the clock is not real time or there are more robots."""
+    """If a plant starts ticks, raise StartError if the clock is not real time or there are more robots."""
     if not any(robot.driven.pace for robot in robots):
         return
     if config.clock != "realtime" or config.speed != 1.0:
@@ -134,7 +134,7 @@ def check_paces(config: ServeConfig, robots: Sequence[ServedRobot]) -> None:
 
 
 def make_clocks(config: ServeConfig, robots: Sequence[ServedRobot]) -> list[Clock]:
-    """Create the clocks: in real time one for all robots; else one per robot, so that no robot waits for another."""
+    """Create clocks: in real time one for all robots; else one per robot, so that none waits for another."""
     if config.clock == "realtime":
         driven = [robot.driven for robot in robots]
         return [Realtime(driven, PERIOD, config.speed, priority=config.realtime_priority)]

@@ -44,7 +44,7 @@ class TickedRobot:
         self.overload: TickCounts | None = None  # counts missed ticks; None if a client advances time
 
     def post(self, do: Do, client: str | None = None) -> None:
-        """Queue a job of `client`, which is done before the next tick. Any thread may call this; it does not block."""
+        """Queue a job of `client`, done before the next tick. Any thread may call this; it does not block."""
         self.jobs.post(do, client)
 
     def guarded(self, do: Do) -> None:
@@ -68,7 +68,7 @@ class TickedRobot:
             self.host.leave_arm()
 
     def attend(self, stepper: str | None) -> bool:
-        """Between two ticks of a step, do other clients' jobs and wait for sockets; return whether the step goes on."""
+        """Between ticks of a step, do other clients' jobs and wait for sockets; return whether it goes on."""
         self.jobs.do_others(stepper)
         while not self.ending and (left := self._patience()) > 0.0:
             self.jobs.do_next_other(stepper, left)
@@ -88,8 +88,9 @@ class Clock(ABC):
         self._thread.start()
 
     def close(self) -> None:
-        """End the thread. In lockstep, a step in progress ends before its next tick; else waiting jobs are done first.
+        """End the thread.
 
+        In lockstep, a step in progress ends before its next tick; else waiting jobs are done first.
         If an arm or a stalled client blocks the thread, the thread is left running until the process ends.
         """
         self._running = False
@@ -137,7 +138,7 @@ class Lockstep(Clock):
 
 
 class Realtime(Clock):
-    """Ticks all robots in one thread, at each period of the monotonic clock, or when the arm of a plant ticks."""
+    """Ticks all robots in one thread, at each period of the monotonic clock, or when a plant's arm ticks."""
 
     def __init__(
         self,
@@ -208,7 +209,7 @@ class Realtime(Clock):
             return True
 
     def _do_without_tick(self, robot: TickedRobot, silent: bool) -> bool:
-        """While the arm does not tick, answer clients, and warn them unless `silent` (already warned); return True."""
+        """While no tick comes, answer clients, and warn them unless `silent` (warned before); return True."""
         robot.guarded(robot.jobs.do_waiting)
         if not silent and robot.interval is None:  # a watched robot reports by itself that it is lost
             robot.host.warn(

@@ -40,7 +40,7 @@ from tvist_server.watching.watched_robot import WatchedRobot
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 SPEED_CAP = 0.5  # default speed limit of a real robot that tvist moves [rad/s]
 TOOL_IN_WORLD = 1.0
-"""Default mass on the flange in a scene [kg]; with no mass, the sensor would not measure contacts of the wrist."""
+"""Default mass on the flange in a scene [kg]; with no mass, the sensor would not measure wrist contacts."""
 _REAL = ("enable_motion", "speed_cap", "tcp", "servo_lag")
 MOST_LAG, LEAST_GAIN = 0.15, 50.0
 """Largest lag [s] and smallest gain [1/s²] of a `servoj` that can be compensated."""
@@ -82,7 +82,7 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
         return ProgramFolder.of(_folder("programs", self.programs), name)
 
     def dump_folder(self) -> Path:
-        """Return the folder for records of the last second before a failure; StartError if the path is no folder."""
+        """Return the folder for records of the last second before failures; StartError if it is no folder."""
         if self.dump is not None:
             return _folder("dump", self.dump)
         try:
@@ -99,7 +99,7 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
         return ticks_of(self.keep, "keep")
 
     def interfaces(self, number: int) -> tuple[str, dict[InterfaceName, int]]:
-        """Return address and ports of the UR interfaces of robot `number`; StartError if there is no such address."""
+        """Return address and ports of robot `number`'s UR interfaces; StartError for an invalid address."""
         try:
             first = ipaddress.ip_address(self.ur_address)
             address = first + number
@@ -211,7 +211,7 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
     def _plant(
         self, cell: Cell | None, description: RobotDescription, calibration: Calibration | None
     ) -> OwnPlant | None:
-        """Return the chosen plant or the scene's; None: the simulated arm. ValueError if options exclude each other."""
+        """Return the chosen plant or the scene's; None: the simulated arm. ValueError if options conflict."""
         world = self._scene(cell)
         if world is not None:
             if self.plant is not None or self.hidden is not None:
@@ -236,11 +236,11 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
         return OwnPlant(str(where), "", moved)
 
     def _scene(self, cell: Cell | None) -> str | None:
-        """Return the scene around the arm: that of the option `world`, or else of the cell; None: no scene."""
+        """Return the scene around the arm: that of option `world`, or else of the cell; None: no scene."""
         return self.world or (None if cell is None else cell.world)
 
     def _lag(self, calibration: Calibration | None) -> ServoLag | None:
-        """Return the lag of `servoj` from the option, or else the calibration; ValueError if it is out of range."""
+        """Return the lag of `servoj` from the option, or else the calibration; ValueError if out of range."""
         if self.servo_lag == "simulated":
             return ServoLag.simulated()
         if self.servo_lag is not None:
@@ -272,7 +272,7 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
         return description if _either(self.floor, profile.floor) else description.without_floor()
 
     def _declared(self, description: RobotDescription, profile: Profile, cell: Cell | None) -> Payload:
-        """Return the declared payload: that of the option `payload`, or else of the cell's tool or the profile."""
+        """Return the declared payload: from the option `payload`, or else the cell's tool or the profile."""
         if self.payload is None and cell is not None and cell.tools:
             return as_declared(cell.tools[0])
         mass = _either(self.payload, profile.payload)

@@ -14,7 +14,7 @@ from tvist_server.gateways.base import Answer, CommandIntake
 
 
 class RobotIntake(CommandIntake):
-    """Checks messages to one robot: passes valid ones on, and rejects others at once without the controller."""
+    """Checks messages to one robot: passes valid ones on, rejects others at once without the controller."""
 
     def __init__(
         self,
@@ -96,7 +96,7 @@ class RobotIntake(CommandIntake):
             self._carry_out(admitted, answer)
 
     def _unless_gone(self, client: str, answer: Answer) -> Answer:
-        """Return `answer` for a grant of control or the clock; if the client has disconnected, it revokes the grant."""
+        """Return `answer` for a grant of control or the clock; it revokes the grant if the client is gone."""
 
         def answered(reply: Reply) -> None:
             for session in self._host.standing.sessions_of(client):

@@ -15,7 +15,7 @@ class _Job(NamedTuple):
 
 
 class Jobs:
-    """Jobs in order of arrival. During a client's step, jobs of others run between ticks, its own after the step."""
+    """Jobs in order of arrival. During a client's step, others' run between ticks, its own after the step."""
 
     def __init__(self) -> None:
         self._new: SimpleQueue[_Job] = SimpleQueue()
@@ -43,7 +43,7 @@ class Jobs:
         return True
 
     def do_others(self, stepper: str | None) -> None:
-        """Between two ticks of a step, do the waiting jobs of other clients; set aside those of the stepping client."""
+        """Between ticks of a step, do other clients' waiting jobs; set aside those of the stepping client."""
         for _ in range(self._new.qsize()):
             self._do_other(self._new.get(), stepper)
 

@@ -53,13 +53,13 @@ class KernelsError(TvistError):
 
 
 def compiled() -> int:
-    """Return how many of `KERNELS` are compiled on disk; a robot that starts must compile the others, which is slow."""
+    """Return how many of `KERNELS` are compiled on disk; starting robots compile the rest, which is slow."""
     return len(held(KERNELS))
 
 
 @cache
 def warm_up() -> None:
-    """Load every kernel of a served robot before the first tick; compile those that are damaged or not on disk."""
+    """Load every kernel of a served robot before the first tick; compile those damaged or not on disk."""
     whole = load_all(KERNELS)
     if not whole or compiled() < len(KERNELS):
         for part in PARTS.values():
@@ -67,7 +67,7 @@ def warm_up() -> None:
 
 
 def compile_ahead(processes: int | None = None, tell: Tell | None = None) -> None:
-    """Compile all kernels of served robots that are not on disk, in `processes` processes (None: one per processor).
+    """Compile all served robots' kernels not on disk, in `processes` processes (None: one per processor).
 
     `tell` gets the progress. Raise KernelsError if a kernel could not be compiled or stored.
     """
@@ -171,7 +171,7 @@ def _setup(robot: str) -> Setup:
 
 
 PARTS: dict[str, Callable[[], None]] = {"line": _line, "plans": _plans}
-"""Functions that compile one part each and take equally long; `plans` compiles filters before `line` needs them."""
+"""Functions that compile one part each in equal time; `plans` compiles filters before `line` needs them."""
 
 
 def _end_with_parent() -> None:

@@ -83,7 +83,7 @@ def numbers_of(name: str, given: str | tuple[float, ...], count: int) -> tuple[f
 
 
 def robots_in(text: str, most: int = MAX_ROBOTS) -> list[tuple[str, str]]:
-    """Return file and name of each robot in a list: `ur5e*2,other.toml` gives the names ur5e-1, ur5e-2, other."""
+    """Return file and name of each robot in a list: `ur5e*2,other.toml` gives names ur5e-1, ur5e-2, other."""
     robots: list[str] = []
     for entry in text.split(","):
         robot, star, count = entry.strip().partition("*")

@@ -49,9 +49,10 @@ class PlanAhead:
     """Passes commands to the controller in order, with a finished plan if planning takes long.
 
     A plan starts from the controller's state when the command's turn comes. If anything that the plan depends
-    on changes before the controller gets it, planning is repeated. Commands wait while an earlier one is planned,
-    except renewals of the lease. A command that stops the arm is carried out at once and again in its turn,
-    so that it ends both the present motion and any motion that was sent before it and would start after it.
+    on changes before the controller gets it, planning is repeated. Commands wait while an earlier one is
+    planned, except renewals of the lease. A command that stops the arm is carried out at once and again in
+    its turn, so that it ends both the present motion and any motion that was sent before it and would start
+    after it.
     """
 
     def __init__(

@@ -24,7 +24,7 @@ class ProgramFolder:
 
     @classmethod
     def of(cls, path: Path, robot: str) -> "ProgramFolder":
-        """Return one robot's folder: if `path` has a subfolder named after the robot, this subfolder, else `path`."""
+        """Return a robot's folder: the subfolder of `path` named after the robot, if any, else `path`."""
         own = path / robot
         return cls(own if own.is_dir() else path)
 
@@ -38,7 +38,7 @@ class ProgramFolder:
             return []
 
     def read(self, name: str) -> str | None:
-        """Return a program's text, ignoring folders in `name`; None: no such file. UserFileError if no program."""
+        """Return a program's text, ignoring folders in `name`; None: no file. UserFileError if no program."""
         file = PurePosixPath(name).name
         candidates = [file, file.removesuffix(URP) + SCRIPT] if file.endswith(URP) else [file]
         for candidate in candidates:
@@ -54,7 +54,7 @@ class ProgramFolder:
         return None
 
     def complete(self, admitted: Admitted) -> Admitted | Refused:
-        """If a command loads a program of the folder, add the program's text, so that the journal contains the text."""
+        """If a command loads a program of the folder, add the program's text, so that the journal has it."""
         command = admitted.command
         if not isinstance(command, ProgramLoad) or command.text is not None:
             return admitted

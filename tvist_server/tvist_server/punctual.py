@@ -57,7 +57,7 @@ def take_priority() -> bool:
 
 
 def background(name: str) -> ThreadPoolExecutor:
-    """Start and return a thread for slow work. A thread that the tick thread starts would inherit its priority."""
+    """Start and return a thread for slow work. One started by the tick thread would inherit its priority."""
     thread = ThreadPoolExecutor(1, name)
     thread.submit(int)
     return thread

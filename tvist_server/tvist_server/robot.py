@@ -125,7 +125,7 @@ class ServedRobot:
         return lambda command, now: thread.submit(planner.plan, command, now).result
 
     def _studies(self, setup: Setup) -> PayloadLearning | None:
-        """Return what learns the payload from motions, in a thread, or None. The journal has each lesson's tick."""
+        """Return what learns the payload from motion in a thread, or None. The journal has lessons' ticks."""
         planner, thread = Planner(setup), background("tvist-studies")
         self._threads.append(thread)
         return payload_learning_of(setup, lambda work: thread.submit(work).done, planner.for_lesson)
@@ -136,11 +136,11 @@ class ServedRobot:
         self.publisher.gateways = gateways
 
     def request(self, command: Command) -> Reply:
-        """Carry out a command of this process, in the controller's thread or (reproducibly) before the first tick."""
+        """Execute this process's command in the controller thread or (reproducibly) before the first tick."""
         return self.host.request(encode(command), LOCAL)
 
     def repeat(self) -> None:
-        """If no tick has passed since the last call, publish the state again for new clients; controller's thread."""
+        """If no tick passed since the last call, republish the state for new clients; controller's thread."""
         report = self.controller.report
         # While a robot is stepped, clients would take a repeated state for a new tick.
         if report.tick == self._looked_at:

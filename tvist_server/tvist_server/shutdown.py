@@ -86,7 +86,7 @@ class Shutdown:
             self._raises = False
 
     def on_request(self, call: Callable[[], object]) -> None:
-        """Set the function that the main thread calls at a signal (now if one has come); it may raise RuntimeError."""
+        """Set what the main thread calls at a signal (now if one has come); it may raise RuntimeError."""
         self._call = call
         if self._received is not None:
             call()

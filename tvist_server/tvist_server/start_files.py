@@ -63,7 +63,7 @@ def with_shaper(setup: Setup, shaper: str) -> Setup:
 
 
 def calibration_for(name: str | None, description: RobotDescription) -> Calibration | None:
-    """Load a calibration by the name of one of the package's, a path, or `none`; None: the package's for this model."""
+    """Load a calibration by name in the package, a path, or `none`; None: the package's for this model."""
     model = description.robot.model
     name = calibrations.default_for(model) if name is None else name
     if name is None:

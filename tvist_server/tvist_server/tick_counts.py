@@ -1,4 +1,4 @@
-"""Detects overload of a robot, as the protocol's `telemetry` defines it, by counting ticks, without a clock."""
+"""Detects a robot's overload, as the protocol's `telemetry` defines it, by counting ticks without a clock."""
 
 BEGINS, BEGINS_AFTER = 0.20, 2
 """Share of a second's due ticks that must be missed [-], and number of such seconds in a row, to enter overload."""
@@ -7,7 +7,7 @@ ENDS, ENDS_AFTER = 0.05, 5
 
 
 class TickCounts:
-    """Counts a robot's due and missed ticks, `period` apart [s]; a second is as many due ticks as one second has.
+    """Counts a robot's due and missed ticks, `period` apart [s]; a second is as many due ticks as fit in it.
 
     A pause of the whole machine is one long second with almost all ticks missed, which alone is no overload.
     """

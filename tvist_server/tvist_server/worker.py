@@ -71,7 +71,7 @@ class ParentPipe:
     died: Callable[[], None]  # cleans up after the first process
 
     def receive(self) -> Any:
-        """Wait for a message of the first process; return False if that has died or the message ends this process."""
+        """Await the first process's message; return False if that died or the message ends this process."""
         try:
             return self.pipe.recv()
         except (EOFError, OSError):
@@ -163,8 +163,9 @@ def serve_router(
 def serve_robots(config: ServeConfig, share: Share, parent: ParentPipe) -> None:
     """Serve robots until the first process ends it or dies.
 
-    It creates its robots and sends `WorkerMade`; after the first message, it starts them and sends `WorkerReady`;
-    after the last, it sends `WorkerEnded`. Only the first process reacts to signals, which a terminal sends to all.
+    It creates its robots and sends `WorkerMade`; after the first message, it starts them and sends
+    `WorkerReady`; after the last, it sends `WorkerEnded`. Only the first process reacts to signals, which a
+    terminal sends to all.
     """
     ending = Shutdown()
     ending.close()  # ignores signals

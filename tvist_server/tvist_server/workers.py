@@ -166,7 +166,7 @@ class Workers:
 
     def _start(self, who: str, do: Callable[[ParentPipe], None]) -> _Worker:
         ours, theirs = multiprocessing.Pipe()
-        # A process that keeps another process's pipe open would hide the end of the first process from that one.
+        # A process that keeps another process's pipe open would hide the first process's end from that one.
         rest = [ours, *(worker.pipe for worker in self._front + self._workers)]
         context = multiprocessing.get_context("fork")
         process = context.Process(target=_begin, args=(do, theirs, rest, self._folder))
@@ -231,7 +231,7 @@ def _begin(
 
 
 def _rehearse(setup: Setup) -> None:
-    """Compile and load what a robot needs, so that forked processes share it; does not create a plug-in arm."""
+    """Compile and load what a robot needs, so that forked processes share it; creates no plug-in arm."""
     setup = replace(setup, plant=None)
     warm_up()
     Planner(setup).rehearse_scripts()

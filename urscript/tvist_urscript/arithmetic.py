@@ -49,7 +49,7 @@ def quotient(a: Number, b: Number) -> Number:
 
 
 def combine(of: Callable[[Any, Any], Value], a: Value, b: Value, done: str, work: Work) -> Value:
-    """Apply a function to two numbers, to two lists elementwise, or to a number and each element of a list."""
+    """Apply a function to two numbers, two lists elementwise, or a number and each element of a list."""
     if type(a) is Array and type(b) is Array:
         return _elementwise(of, a, b, done, work)
     if type(a) in NUMBERS:

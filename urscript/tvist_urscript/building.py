@@ -1,4 +1,4 @@
-"""Builds a script's tree bottom-up during parsing, without recursion, so that nesting cannot overflow the stack."""
+"""Builds a script's tree bottom-up during parsing without recursion, so nesting cannot overflow the stack."""
 
 import re
 from collections.abc import Sequence

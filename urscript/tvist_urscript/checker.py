@@ -50,7 +50,7 @@ def _nodes(*roots: object) -> Iterator[tree.Node]:
 
 
 def _framed_short(text: str) -> list[ScriptError]:
-    """Return the first `end` in column 1 that ends an inner block: for a real robot, the program ends there."""
+    """Return the first `end` in column 1 that ends an inner block: on real robots, the program ends there."""
     from tvist_urscript.parsing import parse
 
     lines, begun = text.split("\n"), 0

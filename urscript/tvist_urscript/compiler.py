@@ -93,7 +93,7 @@ def program_of(text: str) -> tree.Function:
 
 
 def _is_called_alone(head: tree.Function, statements: list[tree.Statement]) -> bool:
-    """Whether only a call of `head` follows its `def`, as in programs that post-processors write for sockets."""
+    """Whether only a call of `head` follows its `def`, as in post-processors' programs for sockets."""
     match statements[1:]:
         case [tree.Evaluate(value=tree.Call(name=name, arguments=[], runs=False))]:
             return head.kind == "def" and name == head.name and not head.parameters
@@ -119,7 +119,7 @@ def _parsed(text: str, *, several: bool = False) -> list[tree.Statement]:
 
 
 def _together(text: str, statements: list[tree.Statement]) -> tree.Function:
-    """Make a program of statements. Its name is that of the last function among them, or else the first word."""
+    """Make a program of statements. Its name is that of the last function among them, else the first word."""
     head = statements[0]
     names = [statement.name for statement in statements if isinstance(statement, tree.Function)]
     word = re.search(r"^[ \t]*([A-Za-z_]\w*)", text, re.MULTILINE)

@@ -197,7 +197,7 @@ class Expressions:
         return ast.YieldFrom(made) if signature.blocks else made
 
     def arguments(self, node: tree.Call, parameters: list[tuple[str, str | None]]) -> list[ast.expr]:
-        """Return a call's arguments in the order of the parameters; they are computed in the order of the text.
+        """Return a call's arguments in the parameters' order; they are computed in the order of the text.
 
         A parameter is a tuple of its name and the name of its default, or None if it has none.
         """

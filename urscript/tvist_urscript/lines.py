@@ -40,7 +40,7 @@ class Lines:
         self._several = several
 
     def process(self, tokens: Iterator[Token]) -> Iterator[Token]:  # noqa: C901  one pass, since texts can be long
-        """Remove line breaks inside statements, and add an end to each statement that ends without a line break."""
+        """Remove line breaks inside statements and add an end to statements that end without a line break."""
         brackets = 0
         last = END
         pending: Token | None = None
@@ -87,7 +87,7 @@ def _named(tokens: Iterator[Token]) -> Iterator[Token]:
 
 
 def _parted(tokens: Iterator[Token]) -> Iterator[Token]:
-    """Add an end between two statements on one line, which UR's interpreter mode allows: `a = 1 textmsg(a)`."""
+    """Add an end between statements on one line, which UR's interpreter mode allows: `a = 1 textmsg(a)`."""
     last = END
     name: Token | None = None
     try:

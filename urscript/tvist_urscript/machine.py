@@ -37,8 +37,8 @@ class Machine:
     Args:
         script: The program.
         functions: The built-in functions that the script calls, without those of `PURE`.
-        finish: Blocking function that each thread calls before it waits for another (`join`, `enter_critical`)
-            and at the end of its function.
+        finish: Blocking function that each thread calls before it waits for another (`join`,
+            `enter_critical`) and at the end of its function.
 
     Raises:
         ValueError: The script calls a function that is not in `functions`.
@@ -88,7 +88,7 @@ class Machine:
 
     @property
     def at_end(self) -> bool:
-        """Whether no statement follows the running built-in function, in its thread or in threads that join that."""
+        """Whether no statement follows the running built-in function in its thread or any that joins that."""
         thread, lines = self._running, set[int]()
         frame: FrameType | None = sys._getframe()  # noqa: SLF001
         while frame is not None:
@@ -122,7 +122,7 @@ class Machine:
         return name_of(steps) or self.script.name, line_of(steps) or 1
 
     def resume(self, budget: int = EVALUATIONS) -> int:
-        """Run all threads for one tick: first those that had no turn in the last tick, then the others by age.
+        """Run all threads for one tick: first those that had no turn in the last tick, then others by age.
 
         Args:
             budget: Evaluations that all threads together may use.
@@ -151,7 +151,7 @@ class Machine:
         return self.left
 
     def hold(self) -> None:
-        """Let no other thread run in this tick; the running one continues until its next statement that waits."""
+        """Let no other thread run in this tick; the running one goes on until its next waiting statement."""
         self._held = True
 
     def end(self) -> None:
@@ -214,7 +214,7 @@ class Machine:
             self._waits(thread, why, before)
 
     def _waits(self, thread: Thread, cost: int | None, before: int) -> None:
-        """Note that a thread waits for the next tick or, if `cost` is given, for a budget that covers this cost.
+        """Note that a thread waits for the next tick or, if `cost` is given, for a budget that covers it.
 
         `cost` is that of the thread's next statements; `before` was the budget left before its turn.
         """

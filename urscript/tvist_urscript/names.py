@@ -50,7 +50,7 @@ class Scope:
         return "local" if name in self.assigned else None
 
     def declare(self, name: str, qualifier: Literal["global", "local"] | None) -> Literal["local", "global"]:
-        """Return whether an assignment sets a local or a global variable; `local` holds for later assignments, too."""
+        """Return whether an assignment sets a local or global variable; `local` holds for later ones, too."""
         if qualifier == "global" or self.outer is None:
             return "global"
         if qualifier == "local":
@@ -58,7 +58,7 @@ class Scope:
         return self.variable(name) or "local"
 
     def find(self, name: str) -> "Scope | None":
-        """Return the scope of the function of this name that can be called here; None: the script has none."""
+        """Return the scope of the function of this name callable here; None: the script has none."""
         scope: Scope | None = self
         while scope is not None:
             if name in scope.functions:

@@ -18,8 +18,8 @@ _NUMBERED = re.compile(r"[fc](\d+)_")
 class Namespace:
     """The functions, constants and variables of a program and of the statements that are added to it.
 
-    `functions` are built-in functions besides those of `PURE`; `charge` takes a cost from the budget; `machine`
-    has what compiled code uses of its machine, by name.
+    `functions` are built-in functions besides those of `PURE`; `charge` takes a cost from the budget;
+    `machine` has what compiled code uses of its machine, by name.
     """
 
     def __init__(
@@ -47,7 +47,7 @@ class Namespace:
             self._names[code.co_name] = FunctionType(code, self._names)
 
     def forget(self, before: int, variables: Collection[str]) -> None:
-        """Remove what was added to the program: scopes below number `before`, and globals not in `variables`."""
+        """Remove what was added to the program: scopes below `before`, and globals not in `variables`."""
         for name in self._names.keys() - self._own:
             found = _NUMBERED.match(name)
             of_variable = name.startswith("g_") and name[2:] not in variables

@@ -75,6 +75,6 @@ floor, ceil = _integer("floor", math.floor), _integer("ceil", math.ceil)
 
 
 def generator() -> Callable[[], float]:
-    """Return the function `random` of a new program: numbers from 0 to below 1, the same sequence in each run."""
+    """Return a new program's function `random`: numbers from 0 to below 1, the same sequence in each run."""
     dice = Random(0)  # noqa: S311  nothing secret
     return lambda: dice.random()  # noqa: PLW0108  its signature can be read

@@ -120,7 +120,7 @@ def _parser(*, several: bool) -> Lark:
 
 
 def parse(text: str, *, several: bool = False) -> list[tree.Statement]:
-    """Return the statements on a text's outermost level; if `several`, a line may have more than one statement."""
+    """Return the statements on a text's outermost level; if `several`, a line may have more than one."""
     try:
         return cast("list[tree.Statement]", _parser(several=several).parse(text))
     except VisitError as error:

@@ -53,7 +53,7 @@ def compare(left: ast.expr, operator: ast.cmpop, right: ast.expr) -> ast.Compare
 
 
 def charge(cost: int, *, check: bool) -> list[ast.stmt]:
-    """Return statements that take a cost from the budget and, with `check`, yield the cost if the budget is spent.
+    """Return statements that charge a cost and, with `check`, yield the cost if the budget is spent.
 
     The machine charges a yielded cost to a later tick.
     """

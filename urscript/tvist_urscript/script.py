@@ -40,5 +40,5 @@ class Script:
     last_lines: frozenset[int] = frozenset()
 
     def forgetting(self, last: "Script") -> "Script":
-        """Return the program to which later statements are added; they cannot use anything added up to `last`."""
+        """Return the program to which later statements are added; they can use nothing added up to `last`."""
         return replace(self, scopes=last.scopes)

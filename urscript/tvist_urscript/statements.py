@@ -13,7 +13,7 @@ from tvist_urscript.signatures import Signatures
 PIECE = 40  # evaluations after which code without loops checks whether the budget is spent
 MOST_LOOPS = 15  # most nested loops: CPython allows 20 nested blocks
 LINK = 15
-"""Most branches of one Python `if`; longer chains are split, since Python nests each `elif` in the previous one."""
+"""Most branches per Python `if`; longer chains are split, as Python nests each `elif` in the previous one."""
 
 Branch = tuple[tree.Expression, list[tree.Statement]]
 Link = tuple[tree.Node, ast.expr, list[ast.stmt]]
@@ -31,7 +31,7 @@ class Statements(Expressions):
         self.temporary = count()
 
     def block(self, body: list[tree.Statement], since: int, cost: int = 0) -> tuple[list[ast.stmt], int]:
-        """Translate statements; return them, and the most evaluations from the budget's last check to their end.
+        """Translate statements; return them and the most evaluations from the last budget check to their end.
 
         `since` is this number at their beginning; `cost` is the cost of code before them, such as conditions,
         that is not charged yet.
@@ -130,8 +130,8 @@ class Statements(Expressions):
     ) -> tuple[list[Link], int, int, int]:
         """Translate one chain of branches (see LINK), whose first condition `test` is charged already.
 
-        Return the branches; the cost to charge if no branch is taken; and `since` (see `block`) after the chain:
-        its largest value if a branch is taken, and its value if none is.
+        Return the branches; the cost to charge if no branch is taken; and `since` (see `block`) after the
+        chain: its largest value if a branch is taken, and its value if none is.
         """
         links: list[Link] = []
         latest = since

@@ -151,7 +151,7 @@ def number(value: Any, what: str) -> int | float:
 
 
 def integer(value: Any, what: str) -> int:
-    """Return an integer, or a whole float such as 3.0 (`/` gives floats) as an integer; otherwise raise Fault."""
+    """Return an integer, or a whole float such as 3.0 (`/` gives floats) as an integer; else raise Fault."""
     if type(value) is int:
         return value
     if type(value) is float and value.is_integer() and LOWEST <= value <= HIGHEST:
@@ -162,7 +162,7 @@ def integer(value: Any, what: str) -> int:
 
 
 def exactly(wanted: type[T], value: Any, what: str) -> T:
-    """Return the value if its type is exactly `wanted` (a pose, for example, is no list); otherwise raise Fault."""
+    """Return a value if its type is exactly `wanted` (a pose, for example, is no list); else raise Fault."""
     if type(value) is wanted:
         return value
     raise Fault(f"{what} has to be {KINDS[wanted]}, not {kind(value)}")
@@ -204,7 +204,7 @@ def short(value: str) -> str:
 
 
 def to_bytes(value: str) -> bytes:
-    """Encode a string as UTF-8; surrogates, which stand for bytes of incomplete characters, become these bytes."""
+    """Encode a string as UTF-8; surrogates for bytes of incomplete characters become these bytes."""
     try:
         return value.encode(errors="surrogateescape")
     except UnicodeEncodeError:

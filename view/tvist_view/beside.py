@@ -52,7 +52,7 @@ def _gathered(robot: Robot) -> Iterator[MotionRecord]:
 
 
 def _curves(look: Look, *runs: MotionRecord) -> dict[str, Any]:
-    """Return |α| of both motions over the time since each started, and when the first one's reference stopped."""
+    """Return |α| of both motions over time since each started, and when the first one's reference stopped."""
     signals = [signals_of(look, run.states, {truth.tick: truth for truth in run.truths}) for run in runs]
     spans = [moves(one) or (one.time[0], one.time[0]) for one in signals]
     shown = [one.between(begun, one.time[-1]) for one, (begun, _) in zip(signals, spans, strict=True)]

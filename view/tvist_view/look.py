@@ -74,10 +74,10 @@ class Look:
         }
 
     def row(self, state: State, truth: Truth | None) -> list[float]:
-        """Return the arm's position at a tick: 4 values per joint and bending link [rad], and 6 per body of its world.
+        """Return the arm's position at a tick: 4 values per joint and bending link [rad], 6 per world body.
 
         They are motor angles, reference, static and dynamic part of the gears' deflections, then static and
-        dynamic part of the two angles of each bending link. Without truth, deflections are zero. Older servers
+        dynamic part of each bending link's two angles. Without truth, deflections are zero. Older servers
         do not send static parts: the whole deflection is then the dynamic part. Unknown body poses are NaN.
         """
         bends = 2 * len(self.geometry.bending)
@@ -109,7 +109,7 @@ class Meshes:
         self._paths: dict[Path, str] = {}
 
     def offer(self, geometry: Geometry) -> list[str]:
-        """Return paths of a robot's meshes; if any is missing or unsuitable, none: the page then draws a simple arm."""
+        """Return a robot's mesh paths; if any is missing or unsuitable, none: the page draws a simple arm."""
         found = [Path(mesh.file) for mesh in geometry.meshes]
         if not all(
             file.suffix.lower() in MESHES and file.is_file() and file.stat().st_size <= LARGEST

@@ -125,7 +125,7 @@ class Pilot:
         now = asyncio.get_running_loop().time()
         pressed = now - self._jog_heard > DEADMAN_S or self._jog != (joint, direction)
         self._jog_heard, self._jog = now, (joint, direction)
-        # The first message does not move the arm. A hidden tab sends one a second, so each of them counts as first.
+        # The first message does not move the arm. A hidden tab sends one a second, so each counts as first.
         if pressed:
             self._jog_barred = False
             return
@@ -209,7 +209,7 @@ async def declare(arm: Arm, mass: float) -> None:
 
 
 def _scaled(payload: Payload, mass: float) -> Payload:
-    """Return a payload of the same shape with another mass; if its mass is zero, a steel disc of 10 cm diameter."""
+    """Return a payload of equal shape with another mass; if its mass is 0, a steel disc of 10 cm diameter."""
     if payload.mass <= 0.0:
         across, along = 0.05**2 / 4 * mass, 0.05**2 / 2 * mass
         return make_payload(mass, (0.0, 0.0, 0.03), (across, 0.0, 0.0, across, 0.0, along))

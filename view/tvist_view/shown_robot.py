@@ -1,4 +1,4 @@
-"""A robot on the network that tabs show: find it, describe it, subscribe to it while it is shown, and move it."""
+"""A robot on the network that tabs show: find it, describe it, subscribe while it is shown, and move it."""
 
 import asyncio
 import contextlib

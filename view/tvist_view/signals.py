@@ -101,7 +101,7 @@ class LatestSignals:
         self._states.append(message)
 
     def row(self) -> list[float] | None:
-        """Return the arm's position at the latest tick whose state and truth are known; None before the first."""
+        """Return the arm's position at the latest tick with known state and truth; None before the first."""
         shown = self._shown if self._shown is not None else self.state
         return None if shown is None else self._look.row(shown, self._truths.get(shown.tick))
 

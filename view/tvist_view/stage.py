@@ -1,4 +1,4 @@
-"""The page's server: one page, and a WebSocket for each tab. By default only this machine can reach the server."""
+"""The page's server: one page and a WebSocket per tab. By default only this machine can reach the server."""
 
 import gzip
 import ipaddress

@@ -14,7 +14,8 @@ class Estimator(Forked, ABC):
         zeta_max: Upper bound of every mode's damping ratio at every q [-], < 1.
         clipped: Whether a mode of the last estimate was clamped to `f_d_min` or `zeta_max`, so that the arm's mode
             differs. It is always False for an estimator whose bounds are those of its modes.
-        abrupt: Whether modes may differ much between nearby configurations, such as where two frequencies meet.
+        abrupt: Whether modes may differ much between nearby configurations, such as
+            where two frequencies meet.
     """
 
     modes: int

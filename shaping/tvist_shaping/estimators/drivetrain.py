@@ -53,7 +53,7 @@ class Drivetrain:
         )
 
     def system(self, mass: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return the inertia, damping and stiffness matrices of L coordinates followed by n motors, (L+n, L+n) each.
+        """Return inertia, damping and stiffness matrices of L coordinates, then n motors, (L+n, L+n) each.
 
         Args:
             mass: M(q), shape (L, L) [kg m^2].

@@ -134,7 +134,7 @@ class Modal(Estimator):
         return f_d, zeta
 
     def _compare_with_last(self, q: Floats) -> int:
-        """Compare a configuration with the last one, then store it as the last; the first counts as a jump."""
+        """Compare a configuration with the last one, then store it as last; the first counts as a jump."""
         if q.shape != self._q.shape:
             if q.ndim != 1:
                 raise EstimatorError("q", q.shape, "of shape (joints,)")

@@ -86,7 +86,8 @@ def follow(  # noqa: C901, PLR0912 - one kernel: its branches are loops over coo
     for k in range(poles.shape[0]):
         for m in range(k):
             if abs(poles[k] - poles[m]) < APART * abs(poles[k]):
-                # If two poles are nearly equal, equal shapes mean that one pole was found twice; crossing poles differ.
+                # If two poles are nearly equal, equal shapes mean that one pole was found twice;
+                # shapes of crossing poles differ.
                 along = 0.0j
                 first, second = 0.0, 0.0
                 for i in range(L):

@@ -17,7 +17,7 @@ LOAD = "load"  # name of the body beyond the flange: the payload, and the finger
 
 
 def hinges(description: RobotDescription, model: "mujoco.MjModel") -> tuple[Integers, Integers, Integers]:
-    """Return the numbers of the coordinates of joints, motors and virtual joints (y and z of each bending link)."""
+    """Return the coordinate numbers of joints, motors and virtual joints (y and z of each bending link)."""
     numbers = range(description.joints)
     names = (
         [f"joint {number}" for number in numbers],
@@ -36,7 +36,7 @@ def link_name(description: RobotDescription, number: int) -> str:
 
 
 def arm_spec(description: RobotDescription, payload: Payload, timestep: float) -> "mujoco.MjSpec":
-    """Return the arm without contacts: hinges, a welded body per link frame, and rotors outside the chain of links."""
+    """Return an arm without contacts: hinges, a welded body per link frame, rotors outside the link chain."""
     kinematics, links, drives = description.kinematics, description.links, description.drives
     flexibility = description.link_flexibility
     stiffness_of = dict(zip(flexibility.links, flexibility.stiffness, strict=True))

@@ -89,9 +89,9 @@ def set_contacts(model: "mujoco.MjModel", given: Contacts) -> None:
 
 
 def _count_turning(model: "mujoco.MjModel") -> None:
-    """Set the inverse mass of bodies that can only turn about their centre of mass, from their inertia and reach.
+    """Set the inverse mass of bodies that can only turn about their centre of mass, from inertia and reach.
 
-    MuJoCo's Â refers to the centre of mass, which does not move in such bodies: Â would be zero or far too small.
+    MuJoCo's Â refers to the centre of mass, which such bodies do not move: Â would be zero or far too small.
     """
     for body in range(1, model.nbody):
         light, turning = model.body_invweight0[body]
@@ -131,7 +131,7 @@ def _inverse_mass(model: "mujoco.MjModel", pair: int) -> float:
 def _touching(
     shapes: Sequence["mujoco.MjsGeom"], model: "mujoco.MjModel", arm: Names, apart: set[frozenset[str]]
 ) -> Iterator[tuple["mujoco.MjsGeom", "mujoco.MjsGeom"]]:
-    """Yield pairs of shapes by MuJoCo's rules: at least one moves, and their bodies are neither equal nor adjacent."""
+    """Yield shape pairs by MuJoCo's rules: at least one moves, and bodies are neither equal nor adjacent."""
     fixed_to = model.body_weldid
 
     def before(body: int) -> int:

@@ -143,7 +143,7 @@ class MujocoArm(SimulatedArm):
         return measured
 
     def move(self, command: DriveCommand) -> None:
-        """Simulate one period, in which the drives' commands change linearly from the previous to the given ones."""
+        """Simulate one period, in which drives' commands change linearly from the last to the given ones."""
         if self._fingers is not None:
             self._fingers.drive(self._data)
         start, end = self._command, np.array([command.q, command.qd, command.torque])
@@ -176,7 +176,7 @@ class MujocoArm(SimulatedArm):
         )
 
     def _wrench(self) -> Floats:
-        """Return the wrench that everything beyond the flange exerts on it, in its frame, shape (6,) [N, N m]."""
+        """Return the wrench on the flange by everything beyond it, in its frame, shape (6,) [N, N m]."""
         data, load = self._data, self._load
         whole = data.cfrc_int[load]  # wrench of the flange on the load, about the centre of mass of the arm
         x, y, z = (data.subtree_com[self._model.body_rootid[load]] - self._place).tolist()

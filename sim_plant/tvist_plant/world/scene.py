@@ -81,7 +81,7 @@ def build(
 
 
 def _mount(tool: "mujoco.MjsBody", load: "mujoco.MjsBody", alone: "mujoco.MjModel") -> None:
-    """Mount the scene's tool on the flange, without mass; `alone` is the compiled scene, which has all numbers."""
+    """Mount the scene's tool on the flange, without mass; `alone` is the compiled scene, with all numbers."""
     if tool.joints or tool.bodies:
         raise SceneError(
             "the body 'tool', which is mounted on the flange, has joints or bodies: must have shapes only"
@@ -102,7 +102,7 @@ def _mount(tool: "mujoco.MjsBody", load: "mujoco.MjsBody", alone: "mujoco.MjMode
 def _add_capsules(
     spec: "mujoco.MjSpec", description: RobotDescription, payload: Payload, hand: Hand | None, *, tooled: bool
 ) -> None:
-    """Add the robot file's capsules without friction and, unless the scene has a tool, a capsule for the payload."""
+    """Add the robot file's capsules without friction and, if the scene has no tool, one for the payload."""
 
     def add(
         body: "mujoco.MjsBody", name: str, start: Sequence[float], end: Sequence[float], radius: float
@@ -139,7 +139,7 @@ def _things(name: str, model: "mujoco.MjModel", bodies: tuple[int, ...], arm: se
     mujoco.mj_kinematics(model, data)
 
     def shape(one: Any, there: Any) -> Shape:
-        """Return a shape in the frame of the moving body that it belongs to; without one, in the base frame."""
+        """Return a shape in the frame of its moving body; without one, in the base frame."""
         place, turn, body = there.xpos, there.xmat.reshape(3, 3), int(one.bodyid[0])
         if body in bodies:
             place, turn = one.pos, pin.Quaternion(np.roll(one.quat, -1)).matrix()

@@ -75,7 +75,7 @@ def router_access(roles: Mapping[str, Role]) -> dict[str, Any]:
 def with_robots_behind(
     access: Mapping[str, Any], robots: Sequence[str], namespace: str, protocol: str
 ) -> dict[str, Any]:
-    """Return `access` extended for the processes of robots, which connect over a `protocol` that only they can use."""
+    """Return `access` extended for robots' processes, which connect over a `protocol` that only they use."""
     own = _serving([_at(namespace, robot) for robot in robots], "robots")
     more = _settings(own, [({"id": "robots", "link_protocols": [protocol]}, own)])
     return {**access, **{part: [*access[part], *more[part]] for part in ("rules", "subjects", "policies")}}
@@ -96,7 +96,7 @@ def _settings(rules: list[Rule], granted: Sequence[tuple[Rule, list[Rule]]]) -> 
 
 
 def _serving(places: Sequence[str], name: str) -> list[Rule]:
-    """Return a router's rules for robots that connect to it: those for clients, with ingress and egress swapped."""
+    """Return a router's rules for robots that connect: those for clients, with ingress and egress swapped."""
     return [
         {
             **rule,

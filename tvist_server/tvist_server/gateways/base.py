@@ -29,10 +29,10 @@ class GatewayError(TvistError):
 
 
 class CommandIntake:
-    """Takes clients' messages from gateways, in any thread, without blocking; by default ignores unanswered kinds."""
+    """Takes messages from gateways, in any thread, without blocking; by default ignores unanswered kinds."""
 
     def request(self, data: bytes, answer: Answer) -> None:
-        """Take an encoded command; call `answer` once: immediately for a rejection, else later in another thread."""
+        """Take an encoded command; call `answer` once: directly if rejected, else later in another thread."""
         raise NotImplementedError
 
     def info(self, answer: Callable[[Callable[[], bytes]], None]) -> None:
@@ -43,14 +43,14 @@ class CommandIntake:
         raise NotImplementedError
 
     def command(self, command: Command, answer: Answer, origin: str | None = None) -> None:
-        """Take a command that the gateway itself makes for the machine with the IP address `origin` (None: unknown)."""
+        """Take a command that the gateway makes for the machine with IP address `origin` (None: unknown)."""
         raise NotImplementedError
 
     def setpoint(self, data: bytes) -> None:
         """Take an encoded set-point."""
 
     def client_seen(self, client: str, session: str = "") -> None:
-        """Note that a client's liveliness token has appeared; `session` has declared it, if the token names one."""
+        """Note that a client's liveliness token appeared; `session` declared it, if the token names one."""
 
     def client_gone(self, client: str, session: str = "") -> None:
         """Note that a client's liveliness token, or the session that declared it, has disappeared."""

@@ -19,7 +19,7 @@ LEAVE = 0.2  # longest wait at shutdown for a blocked console [s]
 
 
 class Throttle:
-    """Passes at most `lines` lines per `WINDOW` and counts the omitted ones; `what` names them in the count."""
+    """Passes at most `lines` lines per `WINDOW` and counts omitted ones; `what` names them in the count."""
 
     def __init__(self, lines: int, what: str) -> None:
         self._lines, self._what = lines, what
@@ -90,7 +90,7 @@ class Console:
 
 
 class ConsoleGateway(Gateway):
-    """Passes events of the robot `name` to the console; `command_line` returns a command line for this robot."""
+    """Passes events of robot `name` to the console; `command_line` returns a command line for this robot."""
 
     wanted_topics: Collection[Topic] = frozenset[Topic]({"event"})
 

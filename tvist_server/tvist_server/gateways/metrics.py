@@ -99,7 +99,7 @@ class Metrics(Collector):
 
 
 Figure = tuple[str, str, str, str, Callable[[MetricsGateway], Mapping[str, float]]]
-"""Prometheus type, name without `tvist_`, meaning, name of a further label or "", and a robot's values by label."""
+"""Prometheus type, name without `tvist_`, meaning, name of a further label or "", and values by label."""
 
 
 def _figures() -> Iterator[Figure]:
@@ -115,7 +115,7 @@ def _figures() -> Iterator[Figure]:
 
 
 def _fields(source: str, fields: Mapping[str, str], unit: float, of: MetricsGateway) -> dict[str, float]:
-    """Return known values of a robot's message times `unit`, by the keys that `fields` maps to the message's fields."""
+    """Return known values of a message times `unit`, by keys that `fields` maps to the message's fields."""
     message = getattr(of, source)
     found = {key: getattr(message, field) for key, field in fields.items() if message is not None}
     return {key: unit * value for key, value in found.items() if value is not None}

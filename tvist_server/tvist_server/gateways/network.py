@@ -91,7 +91,7 @@ class Network:
         truth: bool,
         wanted: Callable[[bool], None] | None = None,
     ) -> ZenohGateway:
-        """Create the gateway of a robot; in lockstep, its publishers wait for clients so that no state is lost.
+        """Create a robot's gateway; in lockstep, its publishers wait for clients so that no state is lost.
 
         If `truth` is False, `wanted`, if given, is called from any thread with whether a client subscribes to
         the topic `truth`.
@@ -106,7 +106,7 @@ class Network:
             self._expected[robot] = self._added(robot, starting, complete=here)
 
     def stop_answering_for_workers(self) -> None:
-        """Stop answering for the expected robots: Zenoh sometimes asks this session although a worker could answer."""
+        """Stop answering for expected robots: Zenoh may ask this session although a worker could answer."""
         for gateway in self._expected.values():
             gateway.withdraw()
 
@@ -150,7 +150,7 @@ def _open(endpoints: Sequence[str], settings: Mapping[str, Any]) -> zenoh.Sessio
 def _connected(
     connect: Sequence[str], listen: Sequence[str], settings: Mapping[str, Any], security: str | None
 ) -> zenoh.Session:
-    """Connect to a router as a client, or as a peer if clients connect here; a router would map all other routers."""
+    """Connect to a router as client, or as peer if clients connect here; a router would map all others."""
     mode = {"mode": "peer", "listen/endpoints": list(listen)} if listen else {"mode": "client"}
     try:
         return _session({**settings, **mode, **CONNECT, **_towards(connect, security)})
@@ -167,7 +167,7 @@ def _connected(
 def open_router(
     listen: Sequence[str], connect: Sequence[str], settings: Mapping[str, Any], security: str | None
 ) -> zenoh.Session:
-    """Open a router's session, which connects to other routers as they appear; GatewayError if it cannot listen."""
+    """Open a router's session, which connects to routers as they appear; GatewayError if it cannot listen."""
     retry = {"connect/retry": CONNECT["connect/retry"]}
     return _open(listen, {**settings, **retry, **_towards(connect, security)})
 

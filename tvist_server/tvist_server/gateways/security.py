@@ -50,7 +50,7 @@ def server_security(
 def router_security(
     listen: Sequence[str], *, security: str | None, insecure: bool
 ) -> tuple[list[str], dict[str, Any]]:
-    """Return a router's endpoints and settings; without certificates, anyone may connect as a robot or a client."""
+    """Return router endpoints and settings; without certificates, anyone may connect as robot or client."""
     secured, settings, roles = _security(listen, security, insecure=insecure)
     return secured, settings if roles is None else {**settings, "access_control": router_access(roles)}
 
@@ -126,7 +126,7 @@ def roles_in(folder: Path) -> dict[str, Role]:
 
 
 def _tls_endpoint(endpoint: str) -> str:
-    """Return an endpoint with the handshake's timeout, for `--security`; StartError unless its protocol is TLS."""
+    """Return an endpoint with handshake timeout, for `--security`; StartError unless its protocol is TLS."""
     if protocol(endpoint) != "tls":
         address = endpoint.partition("/")[2] or "<address>:<port>"
         raise StartError(
@@ -140,7 +140,7 @@ def _tls_endpoint(endpoint: str) -> str:
 
 
 def _check_pair(folder: Path) -> None:
-    """Test the files by a TLS handshake within this process, because Zenoh's errors do not say what is wrong."""
+    """Test the files by a TLS handshake in this process, because Zenoh's errors do not say what is wrong."""
     for name in (AUTHORITY, CERTIFICATE, KEY):
         try:
             read_bytes(folder / name, "certificate or key")

@@ -85,7 +85,7 @@ class _Link(asyncio.Protocol):
             transport.abort()
 
     def end(self, change: SocketChange | None = None) -> None:
-        """End the socket, and report `change` to the controller; None: the controller itself ended the socket."""
+        """End the socket, and report `change` to the controller; None: the controller ended the socket."""
         if change is not None:
             self._say(change)
         elif self.connecting is not None:
@@ -158,7 +158,7 @@ class ProgramSockets(Gateway, SocketPorts):
             self._silent.discard(news.number)
 
     def patience(self) -> float:
-        """Return how long a step may wait for sockets that programs read [s]; after a vain wait, 0 until data comes."""
+        """Return a step's longest wait for sockets being read [s]; after a vain wait, 0 until data comes."""
         waits = [(socket, begun) for socket, begun in self._waits.values() if socket not in self._silent]
         if not waits or not self._moved.isdisjoint(socket for socket, _ in waits):
             self._moved.clear()

@@ -1,7 +1,8 @@
 """The Zenoh gateway: one robot's keys on the server's session.
 
-Callbacks run in Zenoh's threads (`indirect=False`), so that one client's messages are handled in order: a liveliness
-token before the command that follows it. `_closed` is set because a callback may still run while the session closes.
+Callbacks run in Zenoh's threads (`indirect=False`), so that one client's messages are handled in order: a
+liveliness token before the command that follows it. `_closed` is set because a callback may still run while
+the session closes.
 """
 
 import contextlib

@@ -210,7 +210,7 @@ def halt_by_program(ended: int, modes: tuple[int, int, int]) -> Halt | None:
 
 
 def _apart(one: Floats, other: Floats) -> int | None:
-    """Return the index of the joint that differs most; None if it differs by at most `MAX_JOINT_DIFFERENCE`."""
+    """Return the index of the most different joint; None if it differs by at most `MAX_JOINT_DIFFERENCE`."""
     joint = int(np.argmax(np.abs(one - other)))
     return joint if abs(one[joint] - other[joint]) > MAX_JOINT_DIFFERENCE else None
 

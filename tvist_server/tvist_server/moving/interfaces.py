@@ -29,7 +29,7 @@ class NoAnswerError(Exception):
 
 
 def query(place: RobotAddress, question: bytes, answer: Callable[[bytes], T | None]) -> T:
-    """Return an interface's answer once `answer` can parse it (None: incomplete); NoAnswerError after `PATIENCE`."""
+    """Return an interface's reply once `answer` parses it (None: partial); NoAnswerError after `PATIENCE`."""
     heard, ends = b"", time.monotonic() + PATIENCE
     try:
         with socket.create_connection((place.host, place.port), PATIENCE) as connection:
@@ -49,7 +49,7 @@ def query(place: RobotAddress, question: bytes, answer: Callable[[bytes], T | No
 
 
 def query_dashboard(place: RobotAddress, questions: Sequence[str]) -> dict[str, str]:
-    """Return the dashboard's answers to questions that it understands, by question; empty without a dashboard."""
+    """Return the dashboard's answers to questions it understands, by question; empty without a dashboard."""
     text = "".join(f"{question}\n" for question in (*questions, "quit")).encode()
 
     def answers(heard: bytes) -> dict[str, str] | None:

@@ -91,7 +91,7 @@ class MovedRobot(RealArm):
         return self._expected.description
 
     def measure(self) -> Measurement:
-        """Return the posture that the robot's controller holds; PlantError if the robot must not be moved now."""
+        """Return the posture the robot's controller holds; PlantError if the robot must not be moved now."""
         run = self._run
         if run is None or not run.ready:
             may_play = run is not None or self._left_paused
@@ -100,7 +100,7 @@ class MovedRobot(RealArm):
         return self._measured(last or self._robot.newest["target_q"])
 
     def step(self, command: DriveCommand) -> Measurement:
-        """Queue a set-point and return the latest measurements. If periods are made up for, only the last one sends."""
+        """Queue a set-point, return the latest measurements; of periods made up for, only the last sends."""
         if self._run is not None:
             self._run.add(command, played=(self._pace.tick - self._sight.tick) % self._interval == 0)
             if not self._pace.owed:
@@ -187,7 +187,7 @@ class MovedRobot(RealArm):
 
 
 class ControlPeriods:
-    """Counts the control periods of one robot: by its RTDE rows, or while it is silent by this machine's clock."""
+    """Counts one robot's control periods: by its RTDE rows, or while it is silent by this machine's clock."""
 
     def __init__(self) -> None:
         self.tick = 0  # number of the present period, in the robot's time
@@ -199,11 +199,11 @@ class ControlPeriods:
         return now - self._heard > SILENT
 
     def until(self, now: float) -> float:
-        """Return how long to wait for a row [s]: until a local period is due or the robot counts as silent."""
+        """Return how long to wait for rows [s]: until a local period is due or the robot counts as silent."""
         return max(0.0, (self._due if self.silent(now) else self._heard + SILENT) - now)
 
     def row(self, tick: int, now: float) -> bool:
-        """Take a row; return whether a period starts, which is false if the local clock has counted it already."""
+        """Take a row; return whether a period starts, which is false if the local clock has counted it."""
         self._heard = now
         passed = tick - self.tick
         if passed <= 0:
@@ -213,7 +213,7 @@ class ControlPeriods:
         return self.next(now)
 
     def next(self, now: float) -> bool:
-        """If a period is owed, or due by the local clock while the robot is silent, start it and return True."""
+        """If a period is owed, or due by the local clock while the robot is silent, start it; return True."""
         if self.owed:
             self.owed -= 1
         elif self.silent(now) and now >= self._due:

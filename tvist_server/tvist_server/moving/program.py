@@ -12,10 +12,10 @@ NAME = "tvist_follow"  # name of the program, which robots display
 SILENCE = 0.04  # longest time from the last set-point until the arm starts to brake [s]
 FIRST = 10.0  # longest wait for the first set-point [s]
 AWAY = 0.01  # largest distance of a joint from the first set-point [rad]
-AGAIN = 0.016  # longest time without a set-point in which the arm keeps its acceleration, later only its velocity [s]
+AGAIN = 0.016  # longest time without a set-point in which the arm keeps acceleration, then only velocity [s]
 CLOSE = 3e-4  # distance from the set-points, and from their path, that is corrected within one period [rad]
 AFTER_SHIFT = 1e-5
-"""`CLOSE` after the program has shifted the motion in time, since that error does not vanish by itself [rad]."""
+"""`CLOSE` after the program shifted the motion in time, since that error does not vanish by itself [rad]."""
 FADE = 0.05  # time constant of the correction of larger distances [s]
 LOOKAHEAD = 0.03
 """`lookahead_time` of `servoj` [s]: the smallest, since a larger lag only increases the lead that is sent."""
@@ -25,17 +25,17 @@ MARGIN = 1.05  # largest ratio of the arm's speed to that of the fastest set-poi
 JOINTS = 6
 KEPT = 4  # number of set-points in a package: the newest and its predecessors
 MAX_NUMBER = 2**30
-"""Largest number of a set-point or run; the next one is 1. Differences of numbers fit into a 32-bit register."""
+"""Largest number of a set-point or run; the next is 1. Differences of numbers fit into a 32-bit register."""
 
 NUMBER = 24
-"""Input integer: number n of the newest set-point, increased by 1 in each control period; 0: no set-point yet."""
+"""Input integer: number n of the newest set-point, increased by 1 in each control period; 0: none yet."""
 ORDER = 25
-"""Input integer: number of the run that may follow. Other values end a run, but only -number ends one that waits."""
+"""Input integer: number of the run that may follow. Others end a run, but only -number ends a waiting one."""
 SETPOINTS = 24  # first of the input doubles: joint angles of set-point n, then of n-1, n-2 and n-3 [rad]
 
 STATE = 24  # output integer: a `ProgramState`
 PLAYED = 25
-"""Output integer: number of the set-point being played; 0 stands for `MAX_NUMBER`, -1 for the one before, etc."""
+"""Output integer: number of the set-point being played; 0 means `MAX_NUMBER`, -1 the one before, etc."""
 ENDED = 26  # output integer: a `ProgramEnded`
 ALONE = 27  # output integer: number of periods whose set-point was missing, so that the program extrapolated
 LEFT_OUT = 28

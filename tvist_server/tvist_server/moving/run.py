@@ -36,7 +36,7 @@ SETTLES = 25
 GRACE = 5  # number of rows after the program's end in which the modes may still show the reason
 STANDS = 10  # number of rows with the same played set-point after which another program is assumed to run
 HEEDS = 250
-"""Number of ignored set-points after which the program is not `follow.script`, which follows the first one."""
+"""Number of ignored set-points after which the program is not `follow.script`, which follows the first."""
 BEGINS = 5.0  # longest time for the program to start [s]
 TELL_EVERY = 10.0  # shortest time between two reports about late set-points [s]
 LOOK_EVERY = 0.2  # longest time until the upload thread notices that it should end [s]
@@ -76,7 +76,7 @@ class ProgramRun:
         return self._window.newest
 
     def add(self, command: DriveCommand, *, played: bool) -> None:
-        """Take a tick's command. If `played`, add its set-point; until the program follows, add the present posture."""
+        """Take a tick's command. If `played`, add its set-point, or the posture until the program follows."""
         if self.ready:
             setpoint = self._setpoints.next(command).tolist()
             if played:
@@ -141,7 +141,7 @@ class ProgramRun:
 
 
 class Upload:
-    """Sends a program from its own thread; stays connected, since some robots end a program if its sender leaves."""
+    """Sends a program in its own thread; stays connected, as some robots end programs whose sender leaves."""
 
     def __init__(self, place: RobotAddress, text: str, check: Callable[[], str | None]) -> None:
         self._place, self._text, self._check = place, text, check

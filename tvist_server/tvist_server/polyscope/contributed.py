@@ -29,13 +29,13 @@ def kind_of(node: Element) -> str:
 
 
 def lines_of(node: Element) -> list[str] | None:
-    """Return a node's lines of URScript, without those of its children; None if the node cannot be translated."""
+    """Return a node's lines of URScript without its children's; None if the node cannot be translated."""
     kind = node.get("strategyClass") or ""
     return _move_fingers(node) if kind == f"{_GRIPPER}GripperNode" else _LINES.get(kind)
 
 
 def branch_of(node: Element) -> str | None:
-    """Return the first line of a branch of Robotiq's Grip Check; "" for the whole check, None for other nodes."""
+    """Return the first line of a branch of Robotiq's Grip Check; "" for the whole, None for other nodes."""
     return _BRANCHES.get(node.get("strategyClass") or "")
 
 

@@ -34,7 +34,7 @@ class UnknownPartError(Exception):
 
 
 def script_name(text: str) -> str:
-    """Return a name as PolyScope writes it in scripts: letters beyond ASCII become `u` and their code points."""
+    """Return a name as PolyScope writes it in scripts: non-ASCII letters become `u` and their code points."""
     plain = "".join(c if re.match(r"\w", c, re.ASCII) else f"u{ord(c)}" if c.isalpha() else "_" for c in text)
     return plain if plain[:1].isalpha() or plain[:1] == "_" else f"_{plain}"
 

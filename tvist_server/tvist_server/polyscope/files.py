@@ -1,4 +1,4 @@
-"""Reads program files: URScript, or those saved by PolyScope with installation and variables files beside them."""
+"""Reads program files: URScript, or those of PolyScope with installation and variables files beside them."""
 
 import zlib
 from functools import lru_cache

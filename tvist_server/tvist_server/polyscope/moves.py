@@ -31,7 +31,7 @@ TOWARDS = """def point_towards(feature, direction, distance):
   local ahead = pose_trans(feature, p[axis[0] * distance, axis[1] * distance, axis[2] * distance, 0, 0, 0])
   return pose_add(get_target_waypoint(), pose_sub(ahead, feature))
 end"""
-"""URScript function that motions in a direction call: a pose along an axis of a feature from the last target."""
+"""URScript function that motions in a direction call: a pose along a feature's axis from the last target."""
 
 
 @dataclass(frozen=True)
@@ -132,7 +132,7 @@ class Moves:
         return node.get("name") or "Waypoint"
 
     def _place(self, node: Element) -> tuple[str, str]:
-        """Return a waypoint's pose or posture in URScript, and if it was taught a posture near the pose, else ""."""
+        """Return a waypoint's pose or posture in URScript, and a posture near the pose if taught, else ""."""
         name = script_name(self._name(node))
         position = self._references.target(node.find("position"))
         try:
@@ -176,7 +176,7 @@ class Moves:
     # ------------------------------------------------------------------ directions
 
     def direction(self, node: Element) -> None:
-        """Translate a motion in a direction: a thread moves the arm until the condition of an Until node ends it."""
+        """Translate motion in a direction: a thread moves the arm until an Until node's condition ends it."""
         style, text, number = self._style, self._text, self._text.numbers[node]
         feature = node.find("feature")
         shown, frame = self.feature(style.feature if feature is None else feature)

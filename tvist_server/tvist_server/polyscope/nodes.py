@@ -72,7 +72,7 @@ class Nodes:
                 self.missing.append(f"{one.tag} with {error}")
 
     def _branch(self, node: Element, head: str, title: str, *, more: bool) -> None:
-        """Translate a branch; `more`: others follow. The label is before an `if`, but inside `elif` and `else`."""
+        """Translate a branch; `more`: others follow. The label is before `if`, inside `elif` and `else`."""
         first = head.startswith("if ")
         if first:
             self.text.label(node, title)

@@ -10,7 +10,7 @@ _LONGEST = 1000  # longest reference [characters]: enough for the deepest elemen
 
 
 class References:
-    """Follows references such as `../../Assignment[2]/variable`, which PolyScope writes for repeated elements."""
+    """Follows references like `../../Assignment[2]/variable` that PolyScope writes for repeated elements."""
 
     def __init__(self, root: Element) -> None:
         self._parents: dict[Element, Element] = {}
@@ -23,7 +23,7 @@ class References:
         self._known: dict[Element, Element | None] = {}
 
     def target(self, element: Element | None) -> Element | None:
-        """Return the end of an element's references (itself if it has none); None if a reference leads nowhere."""
+        """Return the end of an element's references (itself if it has none); None if one leads nowhere."""
         passed, found = list[Element](), element
         while found is not None and (reference := found.get("reference")) is not None:
             if found in self._known or len(passed) == _MOST:

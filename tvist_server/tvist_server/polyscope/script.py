@@ -130,7 +130,7 @@ def program_text(name: str, body: str) -> str:
 
 
 def with_external_control(text: str, sent: str) -> str:
-    """Replace External Control nodes by a client's text; its functions go first, since they cannot be in loops."""
+    """Replace External Control nodes by a client's text; its functions go first: they cannot be in loops."""
     header, mark, part = sent.partition(_HEADER_ENDS)
     if not mark:
         header, part = "", sent

@@ -26,7 +26,7 @@ class ScriptText:
 
     @contextmanager
     def block(self, head: str, end: str = "end") -> Iterator[None]:
-        """Add a block of the lines added within the context; if `end` is empty, a following branch ends the block."""
+        """Add a block of lines added in the context; if `end` is empty, a following branch ends the block."""
         self.line(head)
         self._depth += 1
         yield

@@ -27,9 +27,9 @@ from tvist_server.recording.writer import heading
 log = logging.getLogger(__name__)
 
 QUEUE_SIZE = 8192
-"""Number of messages that may wait: 30 MB or five seconds, for which a file system's commit may block writing."""
+"""Number of messages that may wait: 30 MB or 5 s, for which a file system's commit may block writing."""
 PAUSE = 0.02
-"""Time between two checks of the queue [s]; waking the writer would cost a system call and the interpreter's lock."""
+"""Time between queue checks [s]; waking the writer would cost a system call and the interpreter's lock."""
 CHECK_EVERY = 1.0  # time between two checks whether the file was moved or deleted [s]
 
 
@@ -37,8 +37,8 @@ class Recorder(Sink):
     """Records one robot until it is closed; RecorderError if the recording cannot start.
 
     Messages come from one thread; they are not copied and must not change afterwards. Without `wait`, taking
-    a message never blocks, and it never raises: if the queue is full or the recording has stopped, messages are
-    dropped and counted.
+    a message never blocks, and it never raises: if the queue is full or the recording has stopped, messages
+    are dropped and counted.
     """
 
     def __init__(
@@ -151,7 +151,7 @@ class Recorder(Sink):
             self._stop(f"the recording {self.path} has stopped and is incomplete: {_reason(error)}")
 
     def _check_file(self) -> None:
-        """If the file was moved, report that once; if it was deleted, raise DeletedError, because its data is lost."""
+        """If the file was moved, report that once; if deleted, raise DeletedError, as its data is lost."""
         there, expected = self._file.where(), self._file.path
         self.place = self._file.whole if there == expected else there
         if there != expected and self._on_moved is not None:

@@ -81,7 +81,7 @@ class Segments:
         self._counted = now
 
     def where(self) -> Path | None:
-        """Return the growing file's present path; None: unknown after a move. DeletedError if the file was deleted."""
+        """Return the growing file's present path; None: unknown after a move. DeletedError if deleted."""
         here = os.fstat(self._stream.fileno())
         if here.st_nlink == 0:
             raise DeletedError
@@ -114,7 +114,7 @@ class Segments:
             raise
 
     def _turn(self, tick: int, keep: int) -> None:
-        """Complete the segment, start the next one with this tick, and delete segments that are no longer needed."""
+        """Complete the segment, start the next one with this tick, and delete segments no longer needed."""
         self.finish()
         self._stream.close()
         self._number += 1
@@ -129,7 +129,7 @@ class Segments:
 
 
 def _new_run(path: Path) -> int:
-    """Return a new run's number; delete the oldest runs and empty ones, unless in use. Empty runs do not count."""
+    """Return a new run's number; delete the oldest and empty runs, unless in use. Empty runs do not count."""
     runs: dict[int, list[Path]] = {}
     for place in path.parent.iterdir():
         found = segment_of(place.name)

@@ -23,7 +23,7 @@ from tvist_protocol.recorded import (
 )
 
 CHUNK_SIZE = 64 * 1024
-"""Bytes compressed at once: 70 states, 0.5 ms. A kill loses at most these. The default, 1 MB, would stall ticks."""
+"""Bytes compressed at once: 70 states, 0.5 ms. A kill loses no more. The default, 1 MB, would stall ticks."""
 
 
 def heading(info: Info, start: Mapping[str, Any]) -> dict[str, str]:

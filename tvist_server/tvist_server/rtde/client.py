@@ -1,6 +1,6 @@
 """The client's side of an RTDE connection without its socket: takes bytes, returns bytes to send and rows.
 
-It negotiates version 2, subscribes to outputs, claims inputs if any, and starts. Without inputs it only reads.
+It negotiates version 2, subscribes to outputs, claims any inputs, and starts. Without inputs it only reads.
 """
 
 from collections.abc import Mapping, Sequence

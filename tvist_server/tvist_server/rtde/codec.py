@@ -25,7 +25,7 @@ class PackageKind(IntEnum):
 
 
 class PackageReader:
-    """Splits a byte stream into packages; if a package's size is less than the header's, only the header is skipped."""
+    """Splits a byte stream into packages; if a size is less than the header's, only the header is skipped."""
 
     def __init__(self) -> None:
         self._buffer = bytearray()

@@ -1,1 +1,1 @@
-"""A real UR robot that is only watched: each of its RTDE rows starts a tick, and tvist sends it only queries."""
+"""A real UR robot that is only watched: each of its RTDE rows starts a tick; tvist sends it only queries."""

@@ -14,7 +14,7 @@ class RobotAddress(NamedTuple):
     port: int = PORT
 
     def beside(self, port: int) -> "RobotAddress":
-        """Return the address of another interface with UR's port number `port`, shifted by as much as RTDE's port."""
+        """Return another interface's address with UR's port number `port`, shifted as much as RTDE's port."""
         return self._replace(port=port + self.port - PORT)
 
     def __str__(self) -> str:

@@ -28,7 +28,7 @@ class UnreachableError(LostError):
 
 
 class RtdeConnection:
-    """One connection to the robot at `place`. `address` is the result of `resolve`; `client` encodes and decodes."""
+    """A connection to the robot at `place`. `address` is `resolve`'s result; `client` encodes and decodes."""
 
     def __init__(self, place: RobotAddress, address: Address, client: RtdeClient) -> None:
         self._place, self.client = place, client

@@ -69,7 +69,7 @@ def sight_of(row: Row, constants: Sequence[float], tick: int, missed: int, told:
 
 
 def _payload(row: Row) -> Payload | None:
-    """Return the payload set on the robot; its inertia is 0 if the robot reports none, or an impossible one."""
+    """Return the payload set on the robot; inertia is 0 if the robot reports none, or an impossible one."""
     mass, com = row.get("payload"), row.get("payload_cog")
     if mass is None or com is None:
         return None
@@ -79,7 +79,7 @@ def _payload(row: Row) -> Payload | None:
 
 
 def has_real_payload(row: Row) -> bool:
-    """Return whether the inertia set on the robot is possible for a body; a missing inertia counts as possible."""
+    """Return whether inertia set on the robot is possible for a body; a missing one counts as possible."""
     return is_real_body(_inertia(row))
 
 
@@ -97,7 +97,7 @@ class Counted(NamedTuple):
 
 
 class RowCount:
-    """Numbers rows by the control periods since the robot's clock started; a row comes every `interval` periods.
+    """Numbers rows by control periods since the robot's clock started; a row comes every `interval` periods.
 
     If that clock is reset, as by a restart, the numbers continue according to the local clock.
     """
@@ -110,7 +110,7 @@ class RowCount:
         self.rows = self.missing = 0  # numbers of rows taken and missing since the first one
 
     def take(self, timestamp: float, now: float, *, reconnected: bool = False) -> Counted | None:
-        """Take a row with its time by the robot's and by the local clock [s]; return None if it repeats the last row.
+        """Take a row, timed by the robot's and the local clock [s]; return None if it repeats the last row.
 
         Raise RtdeError if the robot's time goes back or deviates from the local one, unless the connection
         was lost before.
@@ -137,6 +137,6 @@ class RowCount:
         return Counted(self.tick, missing, anew)
 
     def silence(self) -> int:
-        """Count a control period without a row, in which the loss of the robot is reported; return its number."""
+        """Count a control period without a row, in which the robot's loss is reported; return its number."""
         self.tick += 1
         return self.tick

@@ -1,4 +1,4 @@
-"""A real robot as a plant that starts ticks but takes no command; a lost connection is retried every second."""
+"""A real robot as a plant that starts ticks but takes no command; a lost connection is retried every 1 s."""
 
 import time
 from collections import deque
@@ -27,11 +27,11 @@ TEXTS = 10  # largest number of the robot's messages passed on per second, and q
 RETRY = 1.0  # time between two attempts to connect [s]
 TELL_EVERY = 1.0  # shortest time between two reports about missing rows [s]
 OTHER = 0.03
-"""Deviation of the tool's position that means another model [m]; calibrations shift it by some millimetres."""
+"""Deviation of the tool position that means another model [m]; calibrations shift it by some millimetres."""
 
 
 class WatchedRobot(RealArm):
-    """Reads one robot's RTDE rows and writes the claimed inputs; PlantError if the robot cannot be watched."""
+    """Reads one robot's RTDE rows and writes claimed inputs; PlantError if the robot cannot be watched."""
 
     def __init__(
         self,
@@ -177,7 +177,7 @@ class WatchedRobot(RealArm):
         return rows
 
     def _check(self, row: Row) -> None:
-        """Raise LostError if the tool's pose contradicts the robot file; if the row lacks the pose, only note that."""
+        """Raise LostError if the tool's pose contradicts the robot file; only note a missing pose."""
         if "tcp_offset" not in row:
             self._notes.append(
                 f"whether it is a {self._model} is unknown, because it does not report its tool"
@@ -225,7 +225,7 @@ class WatchedRobot(RealArm):
         return sight
 
     def _lose(self, error: LostError | RtdeError) -> None:
-        """Close the connection; report a loss once per reason in an extra tick, and do not report failed retries."""
+        """Close the connection; report a loss once per reason in an extra tick, but no failed retries."""
         self.close()
         now, why = time.monotonic(), str(error)
         self._retry_at = now + RETRY

@@ -61,7 +61,7 @@ class PortSession(ABC):
 
 @dataclass(eq=False)
 class InTurnSession(PortSession, Generic[Item]):
-    """Handles requests one at a time. If the client disconnects, control is released after its last request."""
+    """Handles requests one by one. If the client disconnects, control is released after its last request."""
 
     _items: deque[Item] = field(default_factory=deque, init=False)
     _busy: bool = field(default=False, init=False)

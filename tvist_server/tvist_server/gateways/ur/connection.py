@@ -48,7 +48,7 @@ REASONS = {
 
 
 class ClientConnection(asyncio.BufferedProtocol):
-    """One client's connection to one interface; if it is `lossless` (lockstep), samples wait for a slow client."""
+    """One client's connection to one interface; if `lossless` (lockstep), samples wait for a slow client."""
 
     def __init__(
         self,
@@ -205,7 +205,7 @@ class ClientConnection(asyncio.BufferedProtocol):
 
 
 class ConnectionLimit:
-    """Decides which clients may connect, so that a flood of new clients does not disturb those that are working.
+    """Decides which clients may connect, so that a flood of new clients does not disturb those that work.
 
     When 90 % of the places are taken, each new client displaces the dispensable one that has been silent for
     longest: a dashboard client, or an RTDE client that has not started or has paused its outputs.
@@ -242,7 +242,7 @@ class ConnectionLimit:
 
 
 def _left_in(transport: asyncio.Transport) -> bytes:
-    """Return the received data of a reset connection: a client may send a script and close with states unread."""
+    """Return received data of a reset connection: a client may send a script and close with states unread."""
     left = bytearray()
     with (
         socket.socket(fileno=os.dup(transport.get_extra_info("socket").fileno())) as stream,

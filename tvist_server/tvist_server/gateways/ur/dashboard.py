@@ -53,7 +53,7 @@ class Command(NamedTuple):
 
 
 def _changing(change: Change, done: str, too_soon: str | None = None) -> Handler:
-    """Return a handler that makes a change and answers `done`; `too_soon` is its answer if the mode forbids that."""
+    """Return a handler that makes a change and answers `done`, or `too_soon` if the mode forbids a change."""
 
     async def carry_out(request: Request) -> str | None:
         refused = await change(request.robot, request.control)

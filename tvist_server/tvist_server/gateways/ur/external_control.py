@@ -39,7 +39,7 @@ class ExternalControl:
         return text if text is not None and EXTERNAL_CONTROL in text else None
 
     async def complete(self, text: str, host: str) -> str | None:
-        """Return `text` with the part of the machine `host`; None if there is no answer or the text gets too long."""
+        """Return `text` with the part of machine `host`; None if no answer comes or the text is too long."""
         sent = await self._fetch(host)
         whole = None if sent is None else with_external_control(text, sent)
         return None if whole is None or len(whole) > MAX_SCRIPT else whole

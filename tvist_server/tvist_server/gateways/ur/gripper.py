@@ -7,7 +7,7 @@ from tvist_controller.cell.gripper import Requests
 from tvist_server.gateways.ur.base import PortSession
 
 AskGripper = Callable[[bytes, Callable[[bytes], None]], None]
-"""Passes a request to the cell's gripper between two ticks; the function for the answer runs in another thread."""
+"""Passes a request to the cell's gripper between two ticks; the answer's callback runs in another thread."""
 
 
 @dataclass(eq=False)

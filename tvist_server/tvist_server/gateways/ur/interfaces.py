@@ -41,11 +41,11 @@ log = logging.getLogger(__name__)
 FIRST = 1000  # longest wait for the first tick [ticks]
 MAX_PENDING = 250  # largest number of states queued for the interfaces' thread: half a second
 LEAD = 20
-"""Largest number of queued states in lockstep; a longer queue would delay answers, which come after its states."""
+"""Longest queue of states in lockstep; a longer one would delay answers, which come after its states."""
 MOST_LINES = 10  # largest number of lines of each kind on the console per `WINDOW`
 PAUSE = 0.02  # time between two checks for room in lockstep [s]
 UNREAD = 10
-"""Number of states handed over together while no client is connected; only temperatures and energies use them."""
+"""Number of states handed over together while no client is connected; for temperatures and energies only."""
 _SESSIONS: Mapping[InterfaceName, Callable[[UrRobot, ConnectionControl, Send], PortSession]] = {
     "dashboard": DashboardSession,
     "interpreter": InterpreterSession,
@@ -198,7 +198,7 @@ class UrInterfaces(Gateway):
     # The following methods run in the interfaces' thread.
 
     def _handle_queue(self) -> None:
-        """Handle the messages queued now. Later messages wake this thread again, so that clients are served between."""
+        """Handle messages queued now. Later ones wake this thread again, so clients are served between."""
         self._woken = False
         for _ in range(len(self._news)):
             message = self._news.popleft()

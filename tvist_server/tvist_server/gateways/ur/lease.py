@@ -1,4 +1,4 @@
-"""Control for clients that know no leases: a host's connections share control until the last of them closes."""
+"""Control for clients that know no leases: a host's connections share control until the last one closes."""
 
 from collections.abc import Awaitable, Callable
 
@@ -56,7 +56,7 @@ class HostLease:
             begin(self._release(token))
 
     async def _release(self, token: str) -> None:
-        """Release control; unless a connection has used control again meanwhile, report the client as gone."""
+        """Release control; unless a connection used control again meanwhile, report the client as gone."""
         await self.ask(ReleaseControl(token=token))
         if not self._users:
             self._intake.client_gone(self.client)

@@ -13,7 +13,7 @@ Change = Callable[[UrRobot, ConnectionControl], Awaitable[Refused | None]]
 
 
 def _change(command: MakeCommand, there: Callable[[Snapshot], bool] = lambda _: False) -> Change:
-    """Return a change. If the robot refuses `command` but is already `there`, in the wanted mode, this is success."""
+    """Return a change. A refusal of `command` is success if the robot is `there`, in the wanted mode."""
 
     async def change(robot: UrRobot, control: ConnectionControl) -> Refused | None:
         reply, latest = await control.change(command), robot.latest

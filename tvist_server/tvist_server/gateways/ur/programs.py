@@ -87,7 +87,7 @@ class Programs:
         return None
 
     async def run(self, text: str, control: ConnectionControl, *, secondary: bool) -> Refused | None:
-        """Start a client's script: beside the running program if the script is secondary, else in its place."""
+        """Start a client's script: beside the running program if the script is secondary, else instead."""
         lasting = control.lasting()
         reply = await lasting.change(lambda token: ProgramRun(token=token, text=text))
         if isinstance(reply, Refused):

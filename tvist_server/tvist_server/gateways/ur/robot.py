@@ -34,7 +34,7 @@ class UrRobot:
 
 
 class InputOwners:
-    """Owners of input variables: the first connection that requests a variable owns it until the connection closes."""
+    """Owners of input variables: the first connection to request one owns it until the connection closes."""
 
     def __init__(self) -> None:
         self._owners: dict[str, object] = {}
@@ -64,7 +64,7 @@ class PendingWrites:
         self._waiting: dict[Hashable, object] = {}
 
     def changed(self, key: Hashable, value: object, present: object) -> bool:
-        """Return whether a value must be sent; `present` is the value that the robot last published, None: none yet."""
+        """Return whether a value must be sent; `present` is what the robot last published, None: none yet."""
         if key in self._waiting:
             return self._waiting[key] != value
         return value != present or self._asked.get(key, value) != value

@@ -31,7 +31,7 @@ CHANGES: Final[Mapping[str, Change]] = {
 
 @dataclass(eq=False)
 class ScriptSession(InTurnSession[Unit]):
-    """Carries out the interface's own commands and runs other script text as programs; the console shows results."""
+    """Carries out the interface's commands and runs other scripts as programs; the console shows results."""
 
     read_only: bool = field(default=False, kw_only=True)  # whether commands are refused
     _reader: ScriptReader = field(default_factory=ScriptReader, init=False)

@@ -1,4 +1,4 @@
-"""Data packages for RTDE clients. Each tick, values are computed once for all recipes, then copied per recipe."""
+"""Data packages for RTDE clients. Values are computed once per tick for all recipes, then copied to each."""
 
 from collections.abc import Iterable
 from itertools import chain
@@ -102,7 +102,7 @@ class _EncodedTick:
         return self._gathered[self._spans[recipe.text]]
 
     def _places_of(self, name: str) -> list[int]:
-        """Return the buffer indices of a variable's bytes; a vector of fewer than six entries is filled with zeros."""
+        """Return the buffer indices of a variable's bytes; zeros fill vectors of fewer than six entries."""
         (part, number), wire = PARTS[name], OUTPUTS[name]
         place, size = self._places[part], wire.size // wire.length
         entries = place.entries // part.variables
@@ -120,7 +120,7 @@ class _Place(NamedTuple):
 
 
 class _Packing:
-    """Packs variables into a buffer from index `first` on; adds each one's position and length to `places`."""
+    """Packs variables into a buffer from index `first`; adds each one's position and length to `places`."""
 
     def __init__(
         self, parts: list[OutputSource], snapshot: Snapshot, first: int, places: dict[OutputSource, _Place]

@@ -33,8 +33,8 @@ _TRUE, _FALSE = b"\x01", b"\x00"
 class RtdeSession(PortSession):
     """Answers the packages of one client and sends it the outputs that it has subscribed to.
 
-    `encoders` has an encoder for each interval between packages [ticks], so that variables of slow clients are not
-    computed at the ticks of fast clients.
+    `encoders` has an encoder for each interval between packages [ticks], so that variables of slow clients
+    are not computed at the ticks of fast clients.
     """
 
     client_begins = True
@@ -129,7 +129,7 @@ class RtdeSession(PortSession):
         self._send(words(PackageKind.SETUP_INPUTS, bytes([number]), types))
 
     def _input_word(self, name: str) -> str:
-        """Return an input variable's type; if this connection cannot set the variable, `NOT_FOUND` or `IN_USE`."""
+        """Return an input variable's type, or `NOT_FOUND` or `IN_USE` if this connection cannot set it."""
         if name not in INPUTS:
             return "NOT_FOUND"
         elsewhere = name in NEED_CONTROL and self._control.held_by_other
@@ -157,14 +157,14 @@ class RtdeSession(PortSession):
         self._send(package(PackageKind.PAUSE, _TRUE))
 
     def _register(self) -> None:
-        """Register the recipe with the encoder for its interval if the client reads it now, else with none."""
+        """Register the recipe with the encoder of its interval if the client reads it now, else with none."""
         self._encoder.end(self)
         if self.served and self._outputs is not None:
             self._encoder = self._encoders[self._every]
             self._encoder.begin(self, self._outputs)
 
     def _warn(self, why: str) -> None:
-        """Send each warning once per start; before the start, a client would take it for the answer to a recipe."""
+        """Send each warning once per start; before the start, clients would take it for a recipe's answer."""
         if self.served and why not in self._warned and len(self._warned) < MAX_WARNINGS:
             self._warned.add(why)
             self._send(warning(self._version, why))

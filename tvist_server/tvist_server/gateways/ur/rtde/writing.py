@@ -22,7 +22,7 @@ LARGEST = 1e308  # largest absolute value of an input; infinity and NaN are refu
 
 
 class InputWriter:
-    """Sets the inputs of one connection. A missing input keeps its last value; a mask never sent counts as 0."""
+    """Sets one connection's inputs. A missing input keeps its last value; a mask never sent counts as 0."""
 
     def __init__(self, robot: UrRobot, control: ConnectionControl, warn: Callable[[str], None]) -> None:
         self._robot = robot
@@ -32,7 +32,7 @@ class InputWriter:
         self._held: dict[str, Value] = {}
 
     def write(self, values: dict[str, Value]) -> None:
-        """Set the variables of one package, except values that are not finite, which are refused with a warning."""
+        """Set the variables of one package; values that are not finite are refused with a warning."""
         for name, value in values.items():
             numbers = value if isinstance(value, tuple) else (value,)
             if not all(abs(number) <= LARGEST for number in numbers):
@@ -132,7 +132,7 @@ class InputWriter:
         )
 
     def _outputs(self, groups: set[str]) -> Iterator[tuple[tuple[str, int], Any, Any]]:
-        """Yield each output that the masks of these groups select: its kind and number, wanted and present value.
+        """Yield each output that these groups' masks select: its kind and number, wanted and present value.
 
         The value of an analogue output is a pair: type, and share of the range.
         """
@@ -194,7 +194,7 @@ def _present(io: Io, name: str) -> Number:
 
 
 def _runs(cells: dict[int, tuple[Number, bool]]) -> Iterator[tuple[int, tuple[Number, ...]]]:
-    """Yield first number and values of each run of consecutive registers, from its first to its last new value."""
+    """Yield first number and values of each run of consecutive registers, from first to last new value."""
     for _, group in groupby(enumerate(sorted(cells)), lambda pair: pair[1] - pair[0]):
         new = [number for _, number in group if cells[number][1]]
         if new:
