@@ -66,7 +66,6 @@ def test_control_and_clock_end_with_the_session():
     intake.client_seen("bert", "1f")
     for command in (c.TakeClock(client="bert"), c.TakeControl(client="bert")):
         intake.request(encode(command), replies.append)
-        jobs.do_waiting()
     assert [type(reply) for reply in replies] == [Accepted, Accepted]
     intake.client_gone("bert", "2f")
     intake.client_gone("anna", "1f")
