@@ -40,9 +40,8 @@ def test_clients_get_key_messages_when_programs_start_and_stop(programs, robot):
 
 def test_a_label_is_sent_once_when_it_is_reached(programs, robot):
     for number, name in ((1, "Robot Program"), (1, "Robot Program"), (2, "Waypoint_1")):
-        programs.io(
-            io(program="f", program_state="PLAYING", program_label=ProgramLabel(number=number, name=name))
-        )
+        label = ProgramLabel(number=number, name=name)
+        programs.io(io(program="f", program_state="PLAYING", program_label=label))
     programs.io(io(program="f"))
     assert [(one.kind, one.values) for one in told(robot)] == [
         (1, {"number": 1, "text": "Robot Program"}),
@@ -67,9 +66,8 @@ def test_texts_and_popups_of_programs_are_sent_to_all_clients(programs, robot):
     text, *popups = told(robot)
     assert (text.kind, text.values["text"]) == (0, "half way")
     assert [popup.values["flags"] for popup in popups] == [[True, False, True], [False, True, False]]
-    assert {(popup.values["title"], popup.values["text"]) for popup in popups} == {
-        ("Robot", "Put the part in")
-    }
+    words = {(popup.values["title"], popup.values["text"]) for popup in popups}
+    assert words == {("Robot", "Put the part in")}
 
 
 def run(programs, control, text="def f():\nend\n", *, secondary=False):
