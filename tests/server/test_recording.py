@@ -96,13 +96,8 @@ def test_an_unwritable_path_or_existing_file_is_refused_before_a_thread_starts(p
     assert path.read_bytes() == b"precious"
 
 
-@pytest.fixture
-def looking(monkeypatch):
-    """Let recorders check their files continuously."""
+def test_a_deleted_recording_stops_and_is_reported(path, monkeypatch):
     monkeypatch.setattr(recorder_module, "CHECK_EVERY", 0.0)
-
-
-def test_a_deleted_recording_stops_and_is_reported(path, looking):
     told = queue.SimpleQueue()
     recorder = Recorder(path, INFO, {}, on_error=told.put)
     path.unlink()
@@ -116,9 +111,9 @@ def test_a_deleted_recording_stops_and_is_reported(path, looking):
 
 
 @pytest.mark.parametrize("folder", [False, True])
-def test_a_moved_recording_continues_and_is_reported_once(tmp_path, looking, folder):
-    told = queue.SimpleQueue()
-    path = tmp_path / "folder" / "run.mcap"
+def test_a_moved_recording_continues_and_is_reported_once(tmp_path, monkeypatch, folder):
+    monkeypatch.setattr(recorder_module, "CHECK_EVERY", 0.0)
+    told, path = queue.SimpleQueue(), tmp_path / "folder" / "run.mcap"
     path.parent.mkdir()
     recorder = Recorder(path, INFO, {}, on_moved=told.put)
     if folder:
