@@ -152,9 +152,9 @@ def test_long_gaps_between_ticks_of_an_arm_count_as_late_or_missed():
     for gap in (0.002, 0.0025, 0.0015, 0.0071):
         now += gap
         found.append(followed.begin(now))
-    assert [number for number, _, _ in found] == [0, 0, 0, 0]
-    assert [late for _, late, _ in found] == pytest.approx([0.0, 0.0005, 0.0, 0.0051], abs=1e-9)
-    assert [missed for _, _, missed in found] == [0, 0, 0, 2]
+    robots, late, missed = zip(*found, strict=True)
+    assert (robots, missed) == ((0, 0, 0, 0), (0, 0, 0, 2))
+    assert late == pytest.approx((0.0, 0.0005, 0.0, 0.0051), abs=1e-9)
 
 
 SEED = 314159

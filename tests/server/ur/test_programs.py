@@ -54,8 +54,7 @@ def test_a_warning_with_a_line_becomes_a_runtime_exception(programs, robot):
     programs.event(Event(tick=5, kind="warning", why=why, line=3, column=5, program="prog"))
     programs.event(Event(tick=5, kind="warning", why="something else"))
     (exception,) = told(robot)
-    assert exception.kind == 10
-    assert exception.values == {"line": 3, "column": 5, "text": why}
+    assert (exception.kind, exception.values) == (10, {"line": 3, "column": 5, "text": why})
 
 
 def test_texts_and_popups_of_programs_are_sent_to_all_clients(programs, robot):
