@@ -60,24 +60,15 @@ class Way:
         return self._last
 
 
-class Heard(Sink):
-    """Keeps the events of a controller."""
-
-    def __init__(self):
-        self.events: list[Event] = []
-
-    def event(self, event):
-        self.events.append(event)
-
-
 class Side:
     """A controller that a client controls, and its events."""
 
     def __init__(self, setup, plant):
-        self.controller, heard = Controller(setup, plant), Heard()
+        self.controller, heard, self.events = Controller(setup, plant), Sink(), list[Event]()
+        heard.event = self.events.append
         reply = self.controller.receive(TakeControl(client=CLIENT))
         assert isinstance(reply, Accepted), "nobody else has control"
-        self._token, self.events, self._host = str(reply.token), heard.events, Host(self.controller, heard)
+        self._token, self._host = str(reply.token), Host(self.controller, heard)
 
     def send(self, kind, **fields):
         return self.controller.receive(kind(token=self._token, **fields))
@@ -148,9 +139,8 @@ class Port:
         """Return a measurement at the robot's target position."""
         state = self.robot.controller.latest
         found = measured(state)
-        return Measurement(
-            np.array(state.target_q), np.zeros_like(found.q), found.moment, found.accelerometer
-        )
+        at_rest = np.zeros_like(found.q)
+        return Measurement(np.array(state.target_q), at_rest, found.moment, found.accelerometer)
 
     def step(self, command):
         """Send the set-point and let the robot tick; return the newest row from before the tick."""
@@ -187,9 +177,8 @@ class Port:
             return
         number, order, *angles = values
         doubles = Registers(bank="input_double", first=r.SETPOINTS, values=tuple(angles))
-        self.robot.controller.receive(
-            SetRegisters(bank="input_int", first=r.NUMBER, values=(int(number), int(order)), also=(doubles,))
-        )
+        ints = {"bank": "input_int", "first": r.NUMBER, "values": (int(number), int(order))}
+        self.robot.controller.receive(SetRegisters(**ints, also=(doubles,)))
 
 
 class Bridge(Side):

@@ -61,9 +61,8 @@ class Wire:
                     messages.append(message)
                     self._news.notify_all()
 
-            self._declared.append(
-                self.session.declare_subscriber(self.key(topic), Callback(take, indirect=False))
-            )
+            direct = Callback(take, indirect=False)
+            self._declared.append(self.session.declare_subscriber(self.key(topic), direct))
         return self
 
     def wait(self, topic, wanted=_any, *, since=0, timeout=PATIENCE):
@@ -83,9 +82,8 @@ class Wire:
 
         with self._news:
             if not self._news.wait_for(there, timeout):
-                raise AssertionError(
-                    f"no such {topic} within {timeout} s; {len(messages)} came, the last {messages[-1:]}"
-                )
+                came = f"{len(messages)} came, the last {messages[-1:]}"
+                raise AssertionError(f"no such {topic} within {timeout} s; {came}")
         return found
 
     def next(self, topic, wanted=_any, **options):

@@ -4,9 +4,8 @@
 def saved(*nodes, before="", threads="", repeats=False, **attributes):
     """A program of nodes."""
     given = "".join(f' {name}="{value}"' for name, value in attributes.items())
-    main = (
-        f"<MainProgram runOnlyOnce='{str(not repeats).lower()}'{given}><children>{''.join(nodes)}</children>"
-    )
+    once = str(not repeats).lower()
+    main = f"<MainProgram runOnlyOnce='{once}'{given}><children>{''.join(nodes)}</children>"
     return f"<URProgram installation='cell'><children>{before}{main}</MainProgram>{threads}</children></URProgram>"
 
 

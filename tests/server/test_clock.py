@@ -22,11 +22,8 @@ class FakeHost:
     """Counts its ticks; `reached` is set after `enough` of them."""
 
     def __init__(self, enough=5):
-        self.failure = None
-        self.ticks, self.missed_ticks, self.warned = 0, 0, []
-        self.enough = enough
-        self.reached = threading.Event()
-        self.threads = set()
+        self.failure, self.enough, self.reached = None, enough, threading.Event()
+        self.ticks, self.missed_ticks, self.warned, self.threads = 0, 0, [], set()
 
     def leave_arm(self):
         self.left = True
@@ -152,19 +149,11 @@ def test_the_server_ends_although_a_call_of_the_arm_never_returns(caplog, monkey
     go_on.set()
 
 
-@pytest.fixture
-def recorder():
-    """A thread that takes the messages of every tick."""
-    ended = threading.Event()
-    thread = threading.Thread(target=ended.wait, name=punctual.RECORDER)
-    thread.start()
-    yield thread
-    ended.set()
-
-
-def test_recorders_get_the_priority_below_that_of_the_tick_thread(monkeypatch, recorder):
+def test_recorders_get_the_priority_below_that_of_the_tick_thread(monkeypatch):
     """A program that displaced a recorder holding the interpreter's lock would delay the tick."""
-    asked = []
+    asked, ended = [], threading.Event()
+    recorder = threading.Thread(target=ended.wait, args=(WAIT,), name=punctual.RECORDER)
+    recorder.start()
 
     def ask(which, policy, parameter):
         asked.append((threading.current_thread().name, which, policy, parameter.sched_priority))
@@ -174,6 +163,7 @@ def test_recorders_get_the_priority_below_that_of_the_tick_thread(monkeypatch, r
         assert asked == []
         with ticking(TickedRobot(FakeHost()), **options):
             pass
+    ended.set()
     policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK  # what a thread with this priority starts has none
     assert asked == [
         ("tvist-tick", 0, policy, punctual.PRIORITY),
@@ -196,23 +186,14 @@ def test_refused_real_time_priority_is_logged_and_the_robot_ticks(monkeypatch, c
     assert robot.host.ticks >= 5
 
 
-def test_in_lockstep_jobs_run_but_no_tick_starts_by_itself():
-    robot, done = TickedRobot(FakeHost()), threading.Event()
-    clock = Lockstep(robot, lambda: None)
-    clock.start()
-    robot.post(done.set)
-    assert done.wait(WAIT)
-    clock.close()
-    assert robot.host.ticks == 0
-
-
-def test_in_lockstep_the_state_is_repeated_even_if_many_jobs_arrive(monkeypatch):
+def test_in_lockstep_no_tick_starts_and_the_state_is_repeated_even_if_many_jobs_arrive(monkeypatch):
     """A new client gets the state even if other jobs, such as telemetry, come as often."""
     monkeypatch.setattr("tvist_server.clock.REPEAT_EVERY", 0.01)
-    robot, repeated = TickedRobot(FakeHost()), threading.Event()
+    robot, repeated, jobs = TickedRobot(FakeHost()), threading.Event(), []
     clock = Lockstep(robot, repeated.set)
 
     def another():
+        jobs.append(1)
         if not repeated.is_set():
             robot.post(another)
 
@@ -220,6 +201,8 @@ def test_in_lockstep_the_state_is_repeated_even_if_many_jobs_arrive(monkeypatch)
     clock.start()
     assert repeated.wait(WAIT)
     clock.close()
+    assert jobs
+    assert robot.host.ticks == 0
 
 
 def test_clients_are_warned_when_an_overload_begins_and_when_it_ends(monkeypatch):

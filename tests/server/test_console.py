@@ -3,26 +3,19 @@
 import logging
 import threading
 
-import pytest
-
 from tvist_protocol.stream import EVENT_MEANINGS, Event
 from tvist_server.gateways.console import STOPS, WARNINGS, WINDOW, Console, ConsoleGateway, Throttle
 
 STOP = Event(tick=7, kind="protective_stop", code="limit_torque", why="torque of joint elbow")
 
 
-@pytest.fixture
-def said(caplog):
-    """Return a function that closes a console and returns its lines."""
-
-    def said(console):
-        console.start()
-        console.close()
-        console._thread.join()
-        assert all(record.levelno >= logging.WARNING for record in caplog.records), "seen without any setting"
-        return [record.getMessage() for record in caplog.records]
-
-    return said
+def lines_of(console, caplog):
+    """Close a console and return its lines."""
+    console.start()
+    console.close()
+    console._thread.join()
+    assert all(record.levelno >= logging.WARNING for record in caplog.records), "seen without any setting"
+    return caplog.messages
 
 
 def publish(console, *events):
@@ -31,18 +24,18 @@ def publish(console, *events):
         gateway.publish("event", event, b"")
 
 
-def test_only_stops_and_warnings_are_logged_with_the_next_step(said):
+def test_only_stops_and_warnings_are_logged_with_the_next_step(caplog):
     console = Console()
     publish(console, *(Event(tick=7, kind=kind, why=kind) for kind in EVENT_MEANINGS))
-    lines = said(console)
+    lines = lines_of(console, caplog)
     assert len(lines) == 3
     assert "left: protective stop at tick 7: protective_stop. Next: tvist unlock --name left" in lines
 
 
-def test_lines_are_limited_and_counted_separately_for_stops_and_warnings(said):
+def test_lines_are_limited_and_counted_separately_for_stops_and_warnings(caplog):
     console = Console()
     publish(console, *[Event(tick=1, kind="warning", why="doubt")] * 100, *[STOP] * 1000)
-    lines = said(console)
+    lines = lines_of(console, caplog)
     assert sum("protective stop" in line for line in lines) == STOPS
     assert sum("doubt" in line for line in lines) == WARNINGS
     assert any(f"{1000 - STOPS} more stops" in line for line in lines)

@@ -106,8 +106,8 @@ class Followed:
 class OnRobot(Followed):
     """The program on a robot without an arm."""
 
-    def __init__(self, *, speed=0.5, deceleration=4.0, step=H):
-        super().__init__(speed, deceleration, step)
+    def __init__(self, *, speed=0.5, deceleration=4.0):
+        super().__init__(speed, deceleration, H)
         self.robot = Robot(plant=NoArm(), q=URSIM, shaper="none")
         functions = self.robot.controller.programs._functions
         servoj = functions["servoj"]
@@ -117,7 +117,7 @@ class OnRobot(Followed):
             yield from servoj(q, *others)
 
         functions["servoj"] = listening
-        self.reply = self.robot.send(ProgramRun, text=self.text)
+        self.robot.send(ProgramRun, text=self.text)
         self.steps(2)
 
     def _step(self):
@@ -125,9 +125,8 @@ class OnRobot(Followed):
 
     def write(self, n, order, *doubles):
         also = (Registers(bank="input_double", first=r.SETPOINTS, values=tuple(map(float, doubles))),)
-        self.robot.send(
-            SetRegisters, bank="input_int", first=r.NUMBER, values=(int(n), int(order)), also=also, token=None
-        )
+        ints = {"bank": "input_int", "first": r.NUMBER, "values": (int(n), int(order))}
+        self.robot.send(SetRegisters, **ints, also=also, token=None)
 
     def output(self, place):
         return self.robot.controller.io().output_int_register[place]
@@ -330,9 +329,8 @@ def test_garbled_packages_never_exceed_the_limits_and_the_arm_ends_at_rest(seed,
 @pytest.mark.parametrize(("speed", "moment"), [(3.0, 3), (0.2, 201), (3.0, 305)])
 def test_the_program_brakes_within_40_ms_of_the_last_set_point(speed, moment):
     path = swings(400, speed)
-    robot, last = followed(
-        path, [[k] for k in range(moment)], moment, OnRobot, speed=speed, deceleration=20.0
-    )
+    arrivals, how = [[k] for k in range(moment)], {"speed": speed, "deceleration": 20.0}
+    robot, last = followed(path, arrivals, moment, OnRobot, **how)
     before = np.abs(robot.targets[-1] - robot.targets[-2]).max()
     robot.until_ended(600)
     assert robot.ended is r.ProgramEnded.SILENCE

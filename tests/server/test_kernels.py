@@ -4,6 +4,7 @@ import subprocess
 import sys
 
 import pytest
+from tests.conformance.served import finished
 
 from tvist_server import kernels
 
@@ -63,10 +64,8 @@ def begun(monkeypatch):
     programs, started = {}, []
 
     def begin(part):
-        command = [sys.executable, "-c", programs[part]]
-        started.append(
-            subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
-        )
+        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
+        started.append(subprocess.Popen([sys.executable, "-c", programs[part]], **pipes))
         return started[-1]
 
     monkeypatch.setattr(kernels, "PARTS", programs)
@@ -93,11 +92,9 @@ def test_a_signal_ends_the_compiling_processes(begun):
 
 
 def test_a_served_robot_loads_no_kernel_while_it_ticks(tmp_path):
-    done = subprocess.run(
-        [sys.executable, "-c", TICKING, str(tmp_path)], capture_output=True, text=True, check=True
-    )
+    done = finished("-c", TICKING, tmp_path, run=subprocess.run)
     assert done.stderr.count("Done(") == 3, done.stderr
-    assert done.stdout == ""
+    assert (done.returncode, done.stdout) == (0, "")
 
 
 @pytest.mark.nightly

@@ -1,5 +1,6 @@
 """The page for Prometheus, read with the parser of its library."""
 
+import contextlib
 import urllib.request
 from pathlib import Path
 
@@ -18,34 +19,20 @@ TELEMETRY = Telemetry(
 )  # fmt: skip
 
 
-def nobody():
-    """A robot without a state."""
-
-
-@pytest.fixture
-def metrics():
-    metrics = Metrics("0")
-    yield metrics
-    metrics.close()
-
-
-def read(metrics):
-    with urllib.request.urlopen(metrics.page) as answer:  # noqa: S310  our own page
-        return {family.name: family for family in text_string_to_metric_families(answer.read().decode())}
-
-
-def test_the_page_has_the_figures_of_a_robot_with_its_labels(metrics):
-    gateway = metrics.add(MetricsGateway("hall-3", "left", nobody))
-    gateway.publish("telemetry", TELEMETRY, b"")
-    for _ in range(2):
-        gateway.publish("event", Event(tick=1, kind="lease_lost", id=None, why="gone"), b"")
-    families = read(metrics)
+def test_the_page_has_the_figures_of_a_robot_with_its_labels():
+    with contextlib.closing(Metrics("0")) as metrics:
+        gateway = metrics.add(MetricsGateway("hall-3", "left", lambda: None))
+        gateway.publish("telemetry", TELEMETRY, b"")
+        for _ in range(2):
+            gateway.publish("event", Event(tick=1, kind="lease_lost", id=None, why="gone"), b"")
+        with urllib.request.urlopen(metrics.page) as answer:  # noqa: S310  our own page
+            text = answer.read().decode()
+    families = {family.name: family for family in text_string_to_metric_families(text)}
     labels = {"namespace": "hall-3", "robot": "left"}
     (rate,) = families["tvist_ticks_per_second"].samples
     assert (rate.labels, rate.value) == (labels, 499.5)
-    lateness = {
-        sample.labels["quantile"]: sample.value for sample in families["tvist_tick_lateness_seconds"].samples
-    }
+    samples = families["tvist_tick_lateness_seconds"].samples
+    lateness = {sample.labels["quantile"]: sample.value for sample in samples}
     assert lateness == pytest.approx({"0.5": 50e-6, "0.99": 900e-6, "1": 2e-3})
     (overloaded,) = families["tvist_overloaded"].samples
     assert (overloaded.labels, overloaded.value) == (labels, 1.0)

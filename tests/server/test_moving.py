@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.controller.robots import UR5E, Robot
 from tests.examples import examples
-from tests.server.test_watching import answers
+from tests.server.test_watching import set_up
 
 from tvist_controller.instruments.snapshot import Instruments
 from tvist_controller.kinematics.arm import Arm
@@ -48,9 +48,8 @@ from tvist_server.moving.interfaces import (
 from tvist_server.moving.moved_robot import SILENT, ControlPeriods, MovedRobot
 from tvist_server.moving.program import ProgramEnded
 from tvist_server.moving.run import ProgramRun, Upload
-from tvist_server.rtde.client import RtdeClient, RtdeError
+from tvist_server.rtde.client import RtdeClient
 from tvist_server.rtde.codec import PackageKind, package
-from tvist_server.rtde.wire import Field, WireType
 from tvist_server.watching.address import place_of
 from tvist_server.watching.connection import RtdeConnection
 from tvist_server.watching.variables import NEEDED, OPTIONAL
@@ -64,28 +63,6 @@ GOOD = Sight(
 EXPECTED = Expected(UR5E, Payload(mass=5.0))
 PLAYING = replace(GOOD, modes=(7, 1, RuntimeState.PLAYING))
 FAR = place_of("ur://127.0.0.1:9")
-
-
-def set_up(client, types, outputs=b"DOUBLE"):
-    for answer in (*answers(outputs), package(PackageKind.SETUP_INPUTS, b"\x07" + types)):
-        client.receive(answer)
-
-
-@pytest.mark.parametrize(
-    ("types", "words"),
-    [
-        (b"IN_USE,DOUBLE", "another client holds its inputs n to n"),
-        (b"NOT_FOUND,NOT_FOUND", "does not know its inputs n to q"),
-        (b"DOUBLE,DOUBLE", "input n is not of type INT32"),
-        (b"INT32", "1 types for 2 inputs"),
-    ],
-)
-def test_inputs_that_cannot_be_claimed_are_reported(types, words):
-    client = RtdeClient(
-        {"timestamp": Field(WireType.DOUBLE)}, {}, {"n": WireType.INT32, "q": WireType.DOUBLE}
-    )
-    with pytest.raises(RtdeError, match=words):
-        set_up(client, types)
 
 
 @pytest.fixture(scope="module")
@@ -132,51 +109,44 @@ def turned(joint, by, target=Q):
     return q
 
 
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"modes": (RobotMode.POWER_OFF, SafetyMode.NORMAL, 1)}, "mode is POWER_OFF: switch it on"),
-        ({"modes": (RobotMode.RUNNING, SafetyMode.REDUCED, 1)}, "safety mode is REDUCED"),
-        ({"modes": (RobotMode.RUNNING, 77, 1)}, "safety mode is 77"),
-        ({"modes": (RobotMode.RUNNING, SafetyMode.NORMAL, RuntimeState.PLAYING)}, "a program runs on it"),
-        ({"modes": (RobotMode.DISCONNECTED, SafetyMode.NORMAL, 1)}, "not connected"),
-        ({"target": np.array([Q, turned(2, 0.1, np.zeros(6)), *np.zeros((2, 6))])}, "it moves"),
-        ({"target": np.array([turned(3, 0.011), *np.zeros((3, 6))])}, "joint 3 is 0.011 rad from where"),
-        ({"payload": Payload(mass=4.9)}, "payload is set to 4.9 kg, and here it is 5 kg"),
-    ],
-)
-def test_a_robot_in_an_unsuitable_state_is_not_moved(changes, words):
-    assert words in why_not_by_state(EXPECTED, replace(GOOD, **changes))
+OFF, REDUCED = (RobotMode.POWER_OFF, SafetyMode.NORMAL, 1), (RobotMode.RUNNING, SafetyMode.REDUCED, 1)
+LIMITED = narrow_limits(UR5E, Configuration(*np.full((7, 6), 1.0)), 0.5)
 
 
 @pytest.mark.parametrize(
-    ("wanted", "words"),
+    ("changes", "wanted", "words"),
     [
-        ({}, None),
-        ({"q": tuple(turned(1, 0.009))}, None),
-        ({"q": tuple(turned(1, 0.02))}, "--start says"),
-        ({"tool": GOOD.tool}, None),
-        ({"tool": (0.0, 0.0, 0.2, 0.0, 0.0, 0.0)}, "--tcp says 0,0,0.2"),
-        ({"description": narrow_limits(UR5E, Configuration(*np.full((7, 6), 1.0)), 0.5)}, "beyond"),
+        ({"modes": OFF}, {}, "mode is POWER_OFF: switch it on"),
+        ({"modes": REDUCED}, {}, "safety mode is REDUCED"),
+        ({"modes": (RobotMode.RUNNING, 77, 1)}, {}, "safety mode is 77"),
+        ({"modes": PLAYING.modes}, {}, "a program runs on it"),
+        ({"modes": (RobotMode.DISCONNECTED, SafetyMode.NORMAL, 1)}, {}, "not connected"),
+        ({"target": np.array([Q, turned(2, 0.1, np.zeros(6)), *np.zeros((2, 6))])}, {}, "it moves"),
+        ({"target": np.array([turned(3, 0.011), *np.zeros((3, 6))])}, {}, "joint 3 is 0.011 rad from where"),
+        ({"payload": Payload(mass=4.9)}, {}, "payload is set to 4.9 kg, and here it is 5 kg"),
+        ({}, {}, None),
+        ({}, {"q": tuple(turned(1, 0.009))}, None),
+        ({}, {"q": tuple(turned(1, 0.02))}, "--start says"),
+        ({}, {"tool": GOOD.tool}, None),
+        ({}, {"tool": (0.0, 0.0, 0.2, 0.0, 0.0, 0.0)}, "--tcp says 0,0,0.2"),
+        ({}, {"description": LIMITED}, "beyond"),
     ],
 )
-def test_options_must_agree_with_the_state_of_the_robot(wanted, words):
-    trouble = why_not_by_state(EXPECTED._replace(**wanted), GOOD)
+def test_a_robot_is_moved_only_in_a_suitable_state_that_agrees_with_the_options(changes, wanted, words):
+    trouble = why_not_by_state(EXPECTED._replace(**wanted), replace(GOOD, **changes))
     assert trouble is None if words is None else words in trouble
 
 
 def test_missing_answers_of_a_robot_are_no_reason_not_to_move_it(sent):
     own = configuration_in(sent)
     assert why_not_by_answers(EXPECTED, {}, None) is None
-    assert (
-        why_not_by_answers(EXPECTED, {"get robot model": "UR5", "is in remote control": "true"}, own) is None
-    )
+    good = {"get robot model": "UR5", "is in remote control": "true"}
+    assert why_not_by_answers(EXPECTED, good, own) is None
     assert "it is a UR10" in why_not_by_answers(EXPECTED, {"get robot model": "UR10"}, own)
     assert "local control" in why_not_by_answers(EXPECTED, {"is in remote control": "false"}, own)
     for wrong in (math.nan, 1e-9):
-        assert "largest velocities" in why_not_by_answers(
-            EXPECTED, {}, own._replace(velocity=np.full(6, wrong))
-        )
+        slow = own._replace(velocity=np.full(6, wrong))
+        assert "largest velocities" in why_not_by_answers(EXPECTED, {}, slow)
     other = EXPECTED._replace(description=load("ur10e"))
     assert "dimensions are not those of a UR10e" in why_not_by_answers(other, {}, own)
 
@@ -379,7 +349,7 @@ class Far:
     def connected(self):
         self.run, self.number, self.q = 0, 0, tuple(Q)
         client, link = RtdeClient(FIELDS, {}, r.INPUTS), object.__new__(RtdeConnection)
-        wires = r.INPUTS.values(), [field.wire for field in FIELDS.values()]
+        wires = [field.wire for field in FIELDS.values()], r.INPUTS.values()
         set_up(client, *(",".join(wire.name for wire in one).encode() for one in wires))
         client.receive(package(PackageKind.START, b"\x01"))
         vars(link).update(client=client, _socket=self, _selector=self, _place=FAR, texts=[])

@@ -13,6 +13,7 @@ from tvist_controller.loopback import LoopbackHost
 from tvist_controller.setup import Setup, body
 from tvist_controller.sources.own_files import OwnFileError
 from tvist_controller.sources.own_plants import OwnPlant, load_plant
+from tvist_controller.sources.own_shapers import load_own
 from tvist_lab.in_process import free_setup
 from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import ReplayError, replay_file
@@ -31,6 +32,7 @@ from tvist_server.workers import _rehearse
 ECHO = """
 import numpy as np
 from tvist_plant.plant import Measurement
+from tvist_shaping import zv
 
 class Echo:
     def __init__(self, description, payload):
@@ -50,6 +52,9 @@ def fails(description, payload):
 
 def leaves(description, payload):
     raise SystemExit(3)
+
+def mine(f_d, zeta):
+    return zv(f_d, zeta)
 """
 
 
@@ -89,12 +94,14 @@ def test_a_signal_while_a_plant_loads_ends_the_process(tmp_path, kind):
         load_plant(f"{file}:make").make(UR5E, UR5E.payload)
 
 
-def test_a_plant_is_pickled_by_reference_to_its_unchanged_file(place):
-    made = ServeConfig(plant=place).setup()
-    assert pickle.loads(pickle.dumps(made.plant)) == made.plant  # noqa: S301  our own
+@pytest.mark.parametrize(("load", "name"), [(load_plant, "Echo"), (load_own, "mine")])
+def test_a_plant_or_shaper_is_pickled_by_reference_to_its_unchanged_file(place, load, name):
+    place = place.replace("Echo", name)
+    own = load(place)
+    assert pickle.loads(pickle.dumps(own)) == own  # noqa: S301  our own
     file = Path(place.rsplit(":", 1)[0])
     file.write_text(ECHO + "\n")
-    other = pickle.dumps(load_plant(place))
+    other = pickle.dumps(load(place))
     file.write_text(ECHO)
     with pytest.raises(OwnFileError, match="has changed"):
         pickle.loads(other)  # noqa: S301  our own
@@ -145,9 +152,9 @@ def test_long_gaps_between_ticks_of_an_arm_count_as_late_or_missed():
     for gap in (0.002, 0.0025, 0.0015, 0.0071):
         now += gap
         found.append(followed.begin(now))
-    assert [number for number, _, _ in found] == [0, 0, 0, 0]
-    assert [late for _, late, _ in found] == pytest.approx([0.0, 0.0005, 0.0, 0.0051], abs=1e-9)
-    assert [missed for _, _, missed in found] == [0, 0, 0, 2]
+    robots, late, missed = zip(*found, strict=True)
+    assert (robots, missed) == ((0, 0, 0, 0), (0, 0, 0, 2))
+    assert late == pytest.approx((0.0, 0.0005, 0.0, 0.0051), abs=1e-9)
 
 
 SEED = 314159

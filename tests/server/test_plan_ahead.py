@@ -43,10 +43,7 @@ class Served:
             self.came.notify()
 
     def send(self, command):
-        self.intake.request(encode(command), self.answer)
-
-    def answer(self, reply):
-        self.replies.append(reply)
+        self.intake.request(encode(command), self.replies.append)
 
     def of(self, kind, **fields):
         return kind(token=self.token, **fields)
@@ -197,9 +194,7 @@ def test_a_stop_does_not_wait_for_commands_that_are_planned(served, stop):
     served.empty()
     assert replies == [Done()]
     kinds = [entry.message["type"] for entry in served.sink.entries]
-    assert kinds.index(tag(type(stop))) < len(kinds) - 5, (
-        "most of what was sent before was still to be planned"
-    )
+    assert kinds.index(tag(type(stop))) < len(kinds) - 5, "most of the others were still to be planned"
 
 
 def test_commands_beyond_the_queue_are_refused_as_busy(served):
@@ -222,7 +217,7 @@ def test_messages_without_control_do_not_reach_the_controller(served):
     ]
     for command in strangers:
         served.send(command)
-    served.intake.request(b"\xc1", served.answer)
+    served.intake.request(b"\xc1", served.replies.append)
     served.intake.setpoint(encode(c.Setpoint(token="x", sequence=0, q=tuple(Q2.tolist()))))
     assert [type(reply) for reply in served.replies[1:]] == [Refused] * 5
     assert (len(served.sink.entries), len(served.jobs)) == (before, jobs)
@@ -235,8 +230,7 @@ def test_control_granted_to_a_disconnected_client_ends_at_once(served):
     served.send(c.TakeControl(client="bert"))
     served.intake.client_gone("bert", "1f")
     served.serve(len(served.replies) + 1)
-    while served.jobs:
-        served.jobs.popleft()()
+    served.empty()
     assert served.host.standing.lease is None
 
 
@@ -247,8 +241,7 @@ def test_a_second_session_of_a_client_neither_gets_nor_keeps_control(served):
     served.intake.client_seen("bert", "2f")
     assert served.ask(c.TakeControl(client="bert")).code == "no_control"
     served.intake.session_gone("1f")
-    while served.jobs:
-        served.jobs.popleft()()
+    served.empty()
     assert served.host.standing.lease is None
     assert isinstance(served.ask(c.TakeControl(client="bert")), Accepted), "one of that name is left"
 

@@ -19,6 +19,10 @@ PARTS = (
     "<ExpressionToken token=' not '/>", "<ExpressionIO><pin referencedName='digital_in[2]'/></ExpressionIO>", "≠",
     "<ExpressionVariable><ProgramVariable name='x'/></ExpressionVariable>",
 )  # fmt: skip
+BRANCHES = "".join(
+    f"<If type='{kind}'>{expression(condition)}<children/></If>"
+    for kind, condition in (("If", "True"), ("ElseIf", "True"), ("Else", ""))
+)
 TOOL = "<feature referencedName='Joint_6_name'/>"
 
 
@@ -72,31 +76,18 @@ def lines(tmp_path):
          ['$ 2 "Gripper"', "rq_set_pos(128)", "rq_set_speed(77)", "rq_set_force(0)", "rq_go_to()", "rq_wait()"]),
         (contributed(f"{GRIPPER}GripperActivate", "Gripper Activate"),
          ['$ 2 "Gripper Activate"', "rq_activate_and_wait()"]),
+        (BRANCHES,
+         ['$ 2 "If True"', "if (True):", "elif (True):", '$ 3 "ElseIf True"', "else:", '$ 4 "Else"', "end"]),
+        (contributed(f"{GRIPPER}gripper_validation_node", "Grip Check",
+                     contributed(f"{GRIPPER}gripper_validation_if_node", "If", "<Halt/>"),
+                     contributed(f"{GRIPPER}gripper_validation_else_node", "Else", "<Halt/>"),
+                     ObjectDetectedKey="false"),
+         ['$ 2 "Grip Check"', '$ 3 "If not(rq_is_object_detected())"', "if (not(rq_is_object_detected())):",
+          '$ 4 "Halt"', "halt", "else:", '$ 5 "Else"', '$ 6 "Halt"', "halt", "end"]),
     ],
 )  # fmt: skip
 def test_a_node_is_translated_to_the_script_that_polyscope_writes(lines, node, script):
     assert lines(node) == ['$ 1 "Robot Program"', *script]
-
-
-def test_if_elseif_and_else_become_one_block(lines):
-    branches = "".join(
-        f"<If type='{kind}'>{expression('True') if kind != 'Else' else expression('')}<children/></If>"
-        for kind in ("If", "ElseIf", "Else")
-    )
-    assert lines(branches)[1:] == [
-        '$ 2 "If True"', "if (True):", "elif (True):", '$ 3 "ElseIf True"', "else:", '$ 4 "Else"', "end",
-    ]  # fmt: skip
-
-
-def test_a_grip_check_becomes_an_if_on_object_detection(lines):
-    held = contributed(f"{GRIPPER}gripper_validation_if_node", "If", "<Halt/>")
-    other = contributed(f"{GRIPPER}gripper_validation_else_node", "Else", "<Halt/>")
-    check = contributed(
-        f"{GRIPPER}gripper_validation_node", "Grip Check", held, other, ObjectDetectedKey="false"
-    )
-    assert [line for line in lines(check) if not line.startswith("$")] == [
-        "if (not(rq_is_object_detected())):", "halt", "else:", "halt", "end",
-    ]  # fmt: skip
 
 
 DH = (
@@ -113,9 +104,8 @@ KNOWN = f"<TCPOffset pose='0, 0, 0.1, 0, 0, 0'/><Kinematics>{KINEMATICS}</Kinema
 
 
 def test_a_taught_waypoint_becomes_a_pose_and_a_posture_near_it(lines):
-    text = lines(
-        move(waypoint("A 1", Q, kinematics=KNOWN)), move(waypoint("A 1", Q, kinematics=KNOWN), kind="MoveL")
-    )
+    taught = waypoint("A 1", Q, kinematics=KNOWN)
+    text = lines(move(taught), move(taught, kind="MoveL"))
     assert text[-3:] == ['$ 4 "MoveL"', '$ 5 "A 1"', "movel(A_1_p, a=2.0, v=1.5)"]
     assert "movej(get_inverse_kin(A_1_p, qnear=A_1_q), a=2.0, v=1.5)" in text
     assert text.count(f"global A_1_q={list(Q)}") == 1
@@ -230,9 +220,8 @@ def test_the_installation_gives_tcp_payload_signals_features_and_variables(tmp_p
     ],
 )  # fmt: skip
 def test_nodes_that_cannot_be_simulated_are_listed_once(lines, node, what):
-    with pytest.raises(
-        UserFileError, match=f"PolyScope saved it with {what}[^,]*, which cannot be simulated"
-    ):
+    why = f"PolyScope saved it with {what}[^,]*, which cannot be simulated"
+    with pytest.raises(UserFileError, match=why):
         lines(node, node)
 
 
@@ -251,10 +240,8 @@ def test_the_clients_text_replaces_the_external_control_node(lines, tmp_path):
     text = text_of(tmp_path / "p.urp", saved(node, "<Halt/>", repeats=True).encode())
     whole = with_external_control(text, SENT)
     assert whole.index("def step") < whole.index("step()\n") < whole.index("halt")
-    assert (
-        with_external_control(program_text("a", EXTERNAL_CONTROL), "sync()\n")
-        == "def a():\n\n  sync()\n\nend\n"
-    )
+    alone = with_external_control(program_text("a", EXTERNAL_CONTROL), "sync()\n")
+    assert alone == "def a():\n\n  sync()\n\nend\n"
 
 
 def test_a_program_that_only_defines_functions_does_not_repeat(lines):

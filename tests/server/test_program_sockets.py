@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 
 import pytest
+from tests.server.ur.served_controller import until
 
 from tvist_controller.programs.sockets import Close, Expire, Open, Send, Taken, Wait
 from tvist_server.allowed_hosts import AllowedHosts
@@ -22,13 +23,8 @@ class Side:
 
     async def connect(self, number=1, address=HERE, origin=HERE):
         self.sockets.carry_out([Open(number, origin, address, self.port)])
-        await self.until(lambda: any(news.number == number for news in self.heard))
+        await until(lambda: any(news.number == number for news in self.heard))
         return self.heard[-1].change
-
-    async def until(self, condition):
-        async with asyncio.timeout(60):
-            while not condition():  # noqa: ASYNC110  what changes belongs to the loop
-                await asyncio.sleep(0)
 
     def received(self):
         return b"".join(news.data for news in self.heard if news.change == "received")
@@ -38,15 +34,9 @@ class Side:
 
 
 @pytest.fixture
-def allowed():
-    """Machines that may be reached besides the one that sent the program."""
-    return ()
-
-
-@pytest.fixture
-async def side(allowed):
+async def side():
     heard, warned, writers = [], [], []
-    sockets = ProgramSockets(heard.append, warned.append, AllowedHosts(allowed))
+    sockets = ProgramSockets(heard.append, warned.append, AllowedHosts(()))
 
     async def accept(reader, writer):
         writers.append(writer)
@@ -70,10 +60,10 @@ async def test_a_socket_carries_data_both_ways_and_reports_its_end_once(side):
     side.sockets.carry_out([Send(1, b"hello")])
     assert await reader.readexactly(5) == b"hello"
     writer.write(b"well")
-    await side.until(lambda: side.received() == b"well")
+    await until(lambda: side.received() == b"well")
     writer.write(b"bye")
     writer.close()
-    await side.until(lambda: "closed" in side.changes())
+    await until(lambda: "closed" in side.changes())
     side.sockets.carry_out([Send(1, b"too late"), Close(1)])
     await asyncio.sleep(0)
     assert side.received() == b"wellbye"
@@ -111,7 +101,8 @@ async def test_a_failed_connection_is_reported(side, port):
         ("192.168.1.5", "localhost", ("localhost",), True),
     ],
 )
-async def test_a_program_connects_only_to_its_sender_and_allowed_hosts(side, origin, address, well):
+async def test_a_program_connects_only_to_its_sender_and_allowed_hosts(side, origin, address, allowed, well):
+    side.sockets._allowed = AllowedHosts(allowed)
     assert await side.connect(address=address, origin=origin) == ("opened" if well else "failed")
     assert bool(side.warned) is not well
     assert well or f"--ur-allow {address}" in side.warned[0]
@@ -140,7 +131,7 @@ async def test_a_flooding_sender_is_paused_until_the_program_reads(side):
     _, writer = await side.accepted.get()
     size = 64 * MAX_UNREAD
     writer.write(bytes(size))
-    await side.until(lambda: len(side.received()) > MAX_UNREAD)
+    await until(lambda: len(side.received()) > MAX_UNREAD)
     for _ in range(2000):
         await asyncio.sleep(0)
     held = len(side.received())
@@ -157,13 +148,12 @@ async def test_a_flooding_sender_is_paused_until_the_program_reads(side):
 
 async def test_a_peer_that_does_not_read_is_disconnected(side):
     await side.connect()
-    reader, writer = await side.accepted.get()
+    _, writer = await side.accepted.get()
     writer.transport.pause_reading()
     for _ in range(400):
         side.sockets.carry_out([Send(1, bytes(MAX_UNSENT // 8))])
         await asyncio.sleep(0)
-    await side.until(lambda: "closed" in side.changes())
-    del reader
+    await until(lambda: "closed" in side.changes())
 
 
 async def test_received_data_is_reported_before_a_timeout(side):
@@ -172,7 +162,7 @@ async def test_received_data_is_reported_before_a_timeout(side):
     side.sockets.carry_out([Wait(7, 1)])
     writer.write(b"x")  # is with the system now, but the network's thread has not read it yet
     side.sockets.carry_out([Expire(7, 1, 0.0)])
-    await side.until(lambda: "expired" in side.changes())
+    await until(lambda: "expired" in side.changes())
     assert side.changes() == ["opened", "received", "expired"]
 
 

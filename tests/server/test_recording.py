@@ -1,15 +1,10 @@
 """The recorder takes messages without blocking, and counts what it drops."""
 
-import os
 import queue
-import signal
-import subprocess
-import sys
 import threading
 
 import msgspec
 import pytest
-from tests import forked
 from tests.server.test_recording_writer import INFO, STATE, TRUTH
 
 from tvist_lab.recordings.mcap_file import read
@@ -30,31 +25,12 @@ def path(tmp_path):
     return tmp_path / "run.mcap"
 
 
-@pytest.fixture
-def gate(monkeypatch):
-    """Holds the writer's thread at its first message until it is opened."""
-    opened, reached = threading.Event(), threading.Event()
-    write = RecordingWriter.write
-
-    def held(self, message):
-        reached.set()
-        opened.wait()
-        write(self, message)
-
-    monkeypatch.setattr(RecordingWriter, "write", held)
-    opened.reached = reached
-    yield opened
-    opened.set()
-
-
 def test_recorded_messages_are_read_back_in_order(path):
-    entries = [
-        entry_of(tick, Setpoint(token="t", sequence=tick, q=(0.1 + 0.2, -0.0))) for tick in range(1, 9)
-    ]
+    setpoints = [Setpoint(token="t", sequence=tick, q=(0.1 + 0.2, -0.0)) for tick in range(1, 9)]
     events = [Event(tick=4, kind="motion_done", id=1), Event(tick=4, kind="warning", why="x")]
     with Recorder(path, INFO, {}) as recorder:
-        for tick, entry in enumerate(entries, start=1):
-            recorder.journal(entry)
+        for tick, setpoint in enumerate(setpoints, start=1):
+            recorder.journal(entry_of(tick, setpoint))
             recorder.state(state(tick))
             recorder.truth(msgspec.structs.replace(TRUTH, tick=tick))
         for event in events:
@@ -82,17 +58,25 @@ def test_equal_runs_make_equal_files(tmp_path, monkeypatch):
     assert paths[0].read_bytes() == paths[1].read_bytes()
 
 
-def test_messages_beyond_the_queue_are_dropped_and_counted(path, gate, monkeypatch):
+def test_messages_beyond_the_queue_are_dropped_and_counted(path, monkeypatch):
+    opened, reached, write = threading.Event(), threading.Event(), RecordingWriter.write
+
+    def held(self, message):
+        reached.set()
+        opened.wait(60)
+        write(self, message)
+
+    monkeypatch.setattr(RecordingWriter, "write", held)
     monkeypatch.setattr(recorder_module, "QUEUE_SIZE", 5)
     recorder = Recorder(path, INFO, {})
     recorder.state(state(0))
-    assert gate.reached.wait(60)
+    assert reached.wait(60)
     for tick in range(1, 11):
         recorder.state(state(tick))
     recorder.event(Event(tick=10, kind="warning"))
     recorder.journal(Entry(tick=10, kind="missed", count=1))
     assert recorder.dropped == 7
-    gate.set()
+    opened.set()
     recorder.close()
     assert recorder.error is None
     assert [s.tick for s in read(path).states] == [0, 1, 2, 3, 4, 5]
@@ -112,19 +96,13 @@ def test_an_unwritable_path_or_existing_file_is_refused_before_a_thread_starts(p
     assert path.read_bytes() == b"precious"
 
 
-@pytest.fixture
-def looking(monkeypatch):
-    """Let recorders check their files continuously."""
+def test_a_deleted_recording_stops_and_is_reported(path, monkeypatch):
     monkeypatch.setattr(recorder_module, "CHECK_EVERY", 0.0)
-
-
-def test_a_deleted_recording_stops_and_is_reported(path, looking):
     told = queue.SimpleQueue()
     recorder = Recorder(path, INFO, {}, on_error=told.put)
     path.unlink()
-    assert told.get(timeout=60) == (
-        f"the recording {path} was deleted, or moved to another file system, where it ends: no more is recorded"
-    )
+    where = f"the recording {path} was deleted, or moved to another file system, where it ends"
+    assert told.get(timeout=60) == f"{where}: no more is recorded"
     recorder.state(state(1))
     assert recorder.dropped == 1
     recorder.close()
@@ -133,9 +111,9 @@ def test_a_deleted_recording_stops_and_is_reported(path, looking):
 
 
 @pytest.mark.parametrize("folder", [False, True])
-def test_a_moved_recording_continues_and_is_reported_once(tmp_path, looking, folder):
-    told = queue.SimpleQueue()
-    path = tmp_path / "folder" / "run.mcap"
+def test_a_moved_recording_continues_and_is_reported_once(tmp_path, monkeypatch, folder):
+    monkeypatch.setattr(recorder_module, "CHECK_EVERY", 0.0)
+    told, path = queue.SimpleQueue(), tmp_path / "folder" / "run.mcap"
     path.parent.mkdir()
     recorder = Recorder(path, INFO, {}, on_moved=told.put)
     if folder:
@@ -165,37 +143,3 @@ def test_on_error_may_close_the_recorder(path):
     assert told.wait(60)
     recorder.close()
     assert recorder.error is not None
-
-
-CHILD = """
-import os, sys
-import msgspec
-from tvist_protocol import Info, State
-from tvist_server.recording.recorder import Recorder
-
-path, info, state, size = sys.argv[1:]
-recorder = Recorder(path, msgspec.json.decode(info, type=Info), {"seed": 5}, wait=True)
-state = msgspec.json.decode(state, type=State)
-tick = 0
-while os.path.getsize(path) < int(size) and recorder.error is None:
-    tick += 1
-    recorder.state(msgspec.structs.replace(state, tick=tick, timestamp=tick * 0.002, actual_q=[tick / 3] * 6))
-print("recording", flush=True)
-sys.stdin.read()
-"""
-
-
-def test_complete_chunks_survive_a_killed_process(path):
-    described = [msgspec.json.encode(message).decode() for message in (INFO, STATE)]
-    command = [sys.executable, "-c", CHILD, str(path), *described, "60000"]
-    with forked.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout.readline() == "recording\n"
-        os.kill(process.pid, signal.SIGKILL)
-    assert process.returncode == -signal.SIGKILL
-    found = read(path)
-    assert not found.complete
-    assert "was not closed" in found.note
-    assert found.start == {"seed": 5}
-    assert found.dropped is None
-    assert [s.tick for s in found.states] == list(range(1, len(found.states) + 1))
-    assert len(found.states) > 100

@@ -36,24 +36,20 @@ def session(ticks):
             yield Entry(tick=tick, kind="missed", count=1)
             yield Event(tick=tick, kind="warning", why="late")
         q = [tick * 0.1, tick / 3, -tick / 7]
-        yield msgspec.structs.replace(
-            STATE, tick=tick, timestamp=tick * 0.002, setpoint_sequence=tick if tick > 6 else None, actual_q=q
-        )
-        yield msgspec.structs.replace(TRUTH, tick=tick, timestamp=tick * 0.002, motor_q=q)
-
-
-def written(messages, start=START, stream=None):
-    stream = stream or io.BytesIO()
-    writer = RecordingWriter(stream, topics(INFO.name), heading(INFO, start))
-    for message in messages:
-        writer.write(message)
-    writer.finish({})
-    return stream
+        now = {"tick": tick, "timestamp": tick * 0.002}
+        sequence = tick if tick > 6 else None
+        yield msgspec.structs.replace(STATE, **now, setpoint_sequence=sequence, actual_q=q)
+        yield msgspec.structs.replace(TRUTH, **now, motor_q=q)
 
 
 @pytest.fixture(scope="module")
 def recording():
-    return written(session(400)).getvalue()
+    stream = io.BytesIO()
+    writer = RecordingWriter(stream, topics(INFO.name), heading(INFO, START))
+    for message in session(400):
+        writer.write(message)
+    writer.finish({})
+    return stream.getvalue()
 
 
 def test_the_plain_mcap_reader_opens_a_recording(recording):

@@ -24,10 +24,8 @@ def played(robots, ticks, start=1000.0, delay=lambda _: 0.0):
 def test_all_robots_tick_in_turn_once_a_period(robots):
     begun = played(robots, 20 * robots)
     assert [robot for robot, *_ in begun] == list(range(robots)) * 20
-    times = [now for _, now, *_ in begun]
-    assert times == pytest.approx(
-        [1000.0 + PERIOD * (1 + tick // robots) for tick in range(20 * robots)], abs=1e-9
-    )
+    due = [1000.0 + PERIOD * (1 + tick // robots) for tick in range(20 * robots)]
+    assert [now for _, now, *_ in begun] == pytest.approx(due, abs=1e-9)
     assert all(late == 0.0 and missed == 0 for _, _, late, missed in begun)
 
 
@@ -57,8 +55,7 @@ def test_missed_ticks_are_counted_for_each_robot():
 @pytest.mark.parametrize("robots", [1, 5])
 def test_at_most_fifty_ticks_are_made_up_for_after_a_delay(robots):
     periods = 200
-    ticks = robots * 300
-    begun = played(robots, ticks, delay=lambda number: periods * PERIOD if number == robots else 0.0)
+    begun = played(robots, robots * 300, delay=lambda number: periods * PERIOD if number == robots else 0.0)
     for robot in range(robots):
         own = [(now, late, missed) for number, now, late, missed in begun if number == robot]
         burst = [late for _, late, _ in own if late >= PERIOD]

@@ -45,11 +45,8 @@ def test_a_host_name_is_local_only_if_all_its_addresses_are_loopback(monkeypatch
     def addresses(*of):
         return lambda *_, **__: [(socket.AF_INET, socket.SOCK_STREAM, 6, "", (address, 0)) for address in of]
 
-    for found, local in (
-        (("127.0.0.1", "127.0.0.2"), True),
-        (("127.0.0.1", "192.0.2.1"), False),
-        ((), False),
-    ):
+    loopback, mixed = ("127.0.0.1", "127.0.0.2"), ("127.0.0.1", "192.0.2.1")
+    for found, local in ((loopback, True), (mixed, False), ((), False)):
         monkeypatch.setattr(socket, "getaddrinfo", addresses(*found))
         assert is_local("tcp/robot:7447") is local
 
@@ -72,10 +69,10 @@ def test_an_encrypted_endpoint_needs_certificates(endpoint):
 ROLES = {"anna": "operator", "wall": "viewer", "otto": "operator"}
 
 
-def granted(role, flow, message, robots=("ur5e",)):
-    """Return the keys that a role may use with a kind of message."""
-    made = access_control(robots, ROLES)
-    (policy,) = (policy for policy in made["policies"] if policy["subjects"] == [role])
+def granted(subject, flow, message, made=None):
+    """Return the keys that a role, or a robot, may use with a kind of message."""
+    made = made or access_control(["ur5e"], ROLES)
+    (policy,) = (policy for policy in made["policies"] if policy["subjects"] == [subject])
     rules = [rule for rule in made["rules"] if rule["id"] in policy["rules"]]
     assert {rule["permission"] for rule in rules} == {"allow"}
     return {
@@ -104,10 +101,10 @@ def test_both_roles_receive_the_robots_topics_and_no_commands(role):
 
 
 def test_rules_cover_exactly_the_served_robots():
-    robots = ("left", "right")
-    setpoints = {f"tvist/{robot}/setpoint" for robot in robots}
-    assert granted("operator", "ingress", "put", robots) == setpoints
-    keys = {key for rule in access_control(robots, ROLES)["rules"] for key in rule["key_exprs"]}
+    made = access_control(("left", "right"), ROLES)
+    setpoints = {"tvist/left/setpoint", "tvist/right/setpoint"}
+    assert granted("operator", "ingress", "put", made) == setpoints
+    keys = {key for rule in made["rules"] for key in rule["key_exprs"]}
     many = {"state", "event", "telemetry", "truth", "io", "alive"}
     shared = {"tvist/*/alive", *(f"**/tvist/*/{leaf}" for leaf in many)}
     assert {key.split("/")[1] for key in keys - shared} == {"left", "right"}
@@ -123,16 +120,9 @@ def test_all_rules_are_inside_the_namespace():
 
 def test_a_router_lets_a_robot_publish_only_under_its_name_or_namespace():
     made = router_access({"hall-3": "robot", "anna": "operator"})
-    (policy,) = (policy for policy in made["policies"] if policy["subjects"] == ["hall-3"])
-    rules = [rule for rule in made["rules"] if rule["id"] in policy["rules"]]
-    puts = [
-        key
-        for rule in rules
-        if rule["flows"] == ["ingress"] and "put" in rule["messages"]
-        for key in rule["key_exprs"]
-    ]
+    puts = granted("hall-3", "ingress", "put", made)
     assert {key.rpartition("/")[0] for key in puts} == {"**/tvist/hall-3", "**/hall-3/tvist/*"}
-    assert not any(rule["flows"] == ["ingress"] and "query" in rule["messages"] for rule in rules)
+    assert not granted("hall-3", "ingress", "query", made)
 
 
 @pytest.mark.parametrize(("name", "role"), ROLES.items())

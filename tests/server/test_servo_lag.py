@@ -26,9 +26,9 @@ class AnyTorque:
     acceleration = staticmethod(lambda *_: np.inf)
 
 
-def commands():
-    """Return the drive commands of a motion from Q1 to Q3 with rests around it."""
-    motion, q = quickest_motion(JointLine(Q1, Q3), MotionLimits(1.5, 2.0, 100.0)), [Q1] * 5
+def commands(start, end, limits):
+    """Return the drive commands of a motion with rests around it."""
+    motion, q = quickest_motion(JointLine(start, end), limits), [start] * 5
     while not motion.finished:
         q.append(motion.next())
     q, qd, _ = central_differences(np.array([*q, *[q[-1]] * 300]))
@@ -37,7 +37,7 @@ def commands():
 
 def errors(lag, lookahead=LOOKAHEAD, gain=GAIN):
     """Return the largest deviation of a joint from its reference at each tick [rad]."""
-    motion = commands()
+    motion = commands(Q1, Q3, MotionLimits(1.5, 2.0, 100.0))
     start = motion[0].q
     servo = ServoFollower((start, 0.0 * start, 0.0 * start), arm_limits(UR5E), REACH, AnyTorque())
     setpoints, apart = ServoSetpoints(start, lag, fastest=FAST, reach=REACH), []
@@ -98,14 +98,9 @@ def test_set_points_keep_range_and_speed_and_reach_rest(seed, fastest):
 
 def test_compensation_does_not_exceed_the_range_of_a_joint():
     """When the arm brakes hard at its end, the compensation would otherwise exceed the range."""
-    end = REACH.copy()
-    motion = quickest_motion(JointLine(end - 0.5, end), MotionLimits(3.0, 20.0, 2000.0))
-    q = [end - 0.5] * 2
-    while not motion.finished:
-        q.append(motion.next())
-    q, qd, _ = central_differences(np.array([*q, *[end] * 50]))
-    setpoints = ServoSetpoints(q[0], ServoLag.simulated(), fastest=FAST, reach=REACH)
-    sent = np.array([setpoints.next(DriveCommand(*both, np.zeros(6))) for both in zip(q, qd, strict=True)])
+    setpoints = ServoSetpoints(REACH - 0.5, ServoLag.simulated(), fastest=FAST, reach=REACH)
+    motion = commands(REACH - 0.5, REACH, MotionLimits(3.0, 20.0, 2000.0))
+    sent = np.array([setpoints.next(command) for command in motion])
     assert sent.max() <= REACH.max()
     assert setpoints.limited > 0
-    assert (sent[-1] == end).all()
+    assert (sent[-1] == REACH).all()

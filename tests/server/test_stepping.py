@@ -28,25 +28,6 @@ Q2 = UR5E.poses["Q2"]
 LONG = tuple(StepSetpoint(sequence=n, q=(3.0,) * 6) for n in range(1000))
 
 
-class Network:
-    """A robot's intake; jobs run when the test says."""
-
-    def __init__(self):
-        self.host, self.jobs, self.replies = Host(Controller(setup(clock="lockstep")), Sink()), Jobs(), []
-        self.intake = RobotIntake(self.host, self.jobs.post, self.carry_out)
-
-    def carry_out(self, admitted, reply):
-        self.jobs.post(lambda: reply(self.host.carry_out(admitted)), admitted.client)
-
-    def send(self, command):
-        self.intake.request(encode(command), self.replies.append)
-
-    def ask(self, command):
-        self.send(command)
-        self.jobs.do_waiting()
-        return self.replies[-1]
-
-
 def test_a_long_step_is_decoded_only_for_the_holder_of_the_clock():
     def long(token, motion_token):
         return encode(SimulationStep(token=token, ticks=1000, setpoints=LONG, motion_token=motion_token))
@@ -80,17 +61,19 @@ def test_the_client_of_a_command_is_known_by_token_or_name(command, client):
 
 
 def test_control_and_clock_end_with_the_session():
-    network = Network()
-    network.intake.client_seen("bert", "1f")
+    host, jobs, replies = Host(Controller(setup(clock="lockstep")), Sink()), Jobs(), []
+    intake = RobotIntake(host, jobs.post, lambda admitted, reply: reply(host.carry_out(admitted)))
+    intake.client_seen("bert", "1f")
     for command in (c.TakeClock(client="bert"), c.TakeControl(client="bert")):
-        assert isinstance(network.ask(command), Accepted)
-    network.intake.client_gone("bert", "2f")
-    network.intake.client_gone("anna", "1f")
-    network.jobs.do_waiting()
-    assert network.host.standing.clock.client == "bert"
-    network.intake.session_gone("1f")
-    network.jobs.do_waiting()
-    assert (network.host.standing.clock, network.host.standing.lease) == (None, None)
+        intake.request(encode(command), replies.append)
+    assert [type(reply) for reply in replies] == [Accepted, Accepted]
+    intake.client_gone("bert", "2f")
+    intake.client_gone("anna", "1f")
+    jobs.do_waiting()
+    assert host.standing.clock.client == "bert"
+    intake.session_gone("1f")
+    jobs.do_waiting()
+    assert (host.standing.clock, host.standing.lease) == (None, None)
 
 
 def test_a_nested_step_is_refused_but_a_stop_is_carried_out():
@@ -108,9 +91,6 @@ def test_a_nested_step_is_refused_but_a_stop_is_carried_out():
     assert stops == [2, 3], "the motion begins at tick 1 and has stopped at tick 2"
 
 
-CLIENTS = st.sampled_from(["stepper", "other", None])
-
-
 def test_jobs_posted_by_a_job_wait_for_the_next_turn():
     jobs, done = Jobs(), []
     jobs.post(lambda: (done.append(1), jobs.post(lambda: done.append(2))))
@@ -118,6 +98,9 @@ def test_jobs_posted_by_a_job_wait_for_the_next_turn():
         jobs.do_waiting()
         assert done == expected
     assert not jobs.do_next(timeout=0.0)
+
+
+CLIENTS = st.sampled_from(["stepper", "other", None])
 
 
 @examples(40)

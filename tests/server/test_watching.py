@@ -22,6 +22,12 @@ def answers(types):
     return [head, version, package(PackageKind.SETUP_OUTPUTS, b"\x01" + types)]
 
 
+def set_up(client, outputs, inputs):
+    """Answer a client's set-up with the types of its variables."""
+    for answer in (*answers(outputs), package(PackageKind.SETUP_INPUTS, b"\x07" + inputs)):
+        client.receive(answer)
+
+
 def data(*numbers):
     return package(PackageKind.DATA, b"\x01" + struct.pack(f">{len(numbers)}d", *numbers))
 
@@ -46,18 +52,25 @@ def test_optional_variables_that_a_robot_lacks_are_left_out():
     assert client.lacking == ["payload"]
 
 
+KNOWN = b"DOUBLE,VECTOR3D,DOUBLE"
+
+
 @pytest.mark.parametrize(
-    ("types", "word"),
+    ("outputs", "inputs", "words"),
     [
-        (b"DOUBLE,NOT_FOUND,DOUBLE", "does not know q"),
-        (b"DOUBLE,VECTOR6D,DOUBLE", "VECTOR3D"),
-        (b"DOUBLE", "1 types"),
+        (b"DOUBLE,NOT_FOUND,DOUBLE", b"", "does not know q"),
+        (b"DOUBLE,VECTOR6D,DOUBLE", b"", "VECTOR3D"),
+        (b"DOUBLE", b"", "1 types"),
+        (KNOWN, b"IN_USE,DOUBLE", "another client holds its inputs n to n"),
+        (KNOWN, b"NOT_FOUND,NOT_FOUND", "does not know its inputs n to r"),
+        (KNOWN, b"DOUBLE,DOUBLE", "input n is not of type INT32"),
+        (KNOWN, b"INT32", "1 types for 2 inputs"),
     ],
 )
-def test_an_unusable_recipe_is_refused(types, word):
-    client = RtdeClient(NEEDED, OPTIONAL)
-    with pytest.raises(RtdeError, match=word):
-        client.receive(b"".join(answers(types)))
+def test_an_unusable_recipe_is_refused(outputs, inputs, words):
+    client = RtdeClient(NEEDED, OPTIONAL, {"n": WireType.INT32, "r": WireType.DOUBLE})
+    with pytest.raises(RtdeError, match=words):
+        set_up(client, outputs, inputs)
 
 
 @examples(40)

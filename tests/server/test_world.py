@@ -108,9 +108,8 @@ def test_options_that_exclude_a_world_are_refused(given, said, tmp_path):
 def test_a_start_inside_an_obstacle_is_refused(tmp_path):
     wall = tmp_path / "wall.xml"
     wall.write_text('<mujoco><worldbody><geom type="box" size="1 1 1"/></worldbody></mujoco>')
-    with pytest.raises(
-        StartError, match=r"world .*wall.xml: .* stands .* mm inside shape 0: choose a posture"
-    ):
+    why = r"world .*wall.xml: .* stands .* mm inside shape 0: choose a posture"
+    with pytest.raises(StartError, match=why):
         ran(ServeConfig(world=str(wall), clock="free").setup(), "def a():\nend")
 
 

@@ -34,9 +34,8 @@ for bank in ("output", "input"):
     OUTPUT_TYPES |= {f"{bank}_bit_register_{k}": "BOOL" for k in range(64, 128)}
     OUTPUT_TYPES |= {f"{bank}_int_register_{k}": "INT32" for k in range(48)}
     OUTPUT_TYPES |= {f"{bank}_double_register_{k}": "DOUBLE" for k in range(48)}
-BYTES = [
-    f"{group}_digital_output{end}" for group in ("standard", "configurable", "tool") for end in ("_mask", "")
-]
+GROUPS = ("standard", "configurable", "tool")
+BYTES = [f"{group}_digital_output{end}" for group in GROUPS for end in ("_mask", "")]
 INPUT_TYPES = {
     "speed_slider_mask": "UINT32", "speed_slider_fraction": "DOUBLE", **dict.fromkeys(BYTES, "UINT8"),
     "standard_analog_output_mask": "UINT8", "standard_analog_output_type": "UINT8",

@@ -1,6 +1,7 @@
 """A controller behind its interfaces, and clients at them, all in the test's own loop."""
 
 import asyncio
+import struct
 from collections import deque
 
 from tests.controller.robots import Robot
@@ -9,6 +10,8 @@ from tvist_controller.host import Host
 from tvist_controller.instruments.report import Sink
 from tvist_protocol.codec import encode
 from tvist_server.ur_ports import UrPorts
+
+from . import rtde_client
 
 EVERYWHERE = dict.fromkeys(UrPorts().open(), 0)  # a free port for each interface
 PATIENCE = 60.0  # longest wait; what takes longer hangs [s]
@@ -101,4 +104,19 @@ async def connect_and_greet(served):
     """Connect a client to the dashboard, and read the greeting."""
     reader, writer = await connect(served, "dashboard")
     await reader.readline()
+    return reader, writer
+
+
+async def package(reader):
+    """Return the type of the next RTDE package."""
+    head = await asyncio.wait_for(reader.readexactly(3), PATIENCE)
+    await reader.readexactly(struct.unpack(">H", head[:2])[0] - 3)
+    return head[2:]
+
+
+async def rtde(served, names=("timestamp",)):
+    """Connect an RTDE client that receives samples."""
+    reader, writer = await connect(served, "rtde")
+    writer.write(rtde_client.version() + rtde_client.outputs(names) + rtde_client.package("S"))
+    assert [await package(reader) for _ in range(3)] == [b"V", b"O", b"S"]
     return reader, writer

@@ -32,12 +32,6 @@ def test_each_further_robot_uses_the_next_address():
     assert config(ur_address="::1").interfaces(0)[0] == "::1"
 
 
-@pytest.mark.parametrize("address", ["robot", "127.0.0.300"])
-def test_an_invalid_address_is_refused(address):
-    with pytest.raises(StartError, match=f"ur_address is '{address}'"):
-        config(ur_address=address).interfaces(0)
-
-
 def test_interfaces_with_joint_values_refuse_an_arm_with_seven_joints():
     seven = {"robot": str(SEVEN), "calibration": "none"}
     with pytest.raises(StartError, match="the robot seven has 7 joints") as refused:
@@ -51,12 +45,18 @@ def test_interfaces_with_joint_values_refuse_an_arm_with_seven_joints():
     assert from_mapping(seven, "tvist.toml").setups()[0].description.joints == 7
 
 
-def test_several_robots_need_one_address_each_and_ports_must_be_valid():
-    with pytest.raises(StartError, match="one address each"):
-        config(ur_address=EVERYWHERE).interfaces(1)
-    for ports in ({"rtd": 30004}, {"rtde": 70000}, {"rtde": -1}, {"rtde": "x"}):
-        with pytest.raises(StartError, match=next(iter(ports))):
-            config(ur_ports=ports)
+@pytest.mark.parametrize(
+    ("values", "robot", "named"),
+    [
+        *(({"ur_address": address}, 0, f"ur_address is '{address}'") for address in ("robot", "127.0.0.300")),
+        ({"ur_address": EVERYWHERE}, 1, "one address each"),
+        ({"ur_ports": {"rtd": 30004}}, 0, "rtd"),
+        *(({"ur_ports": {"rtde": port}}, 0, "rtde") for port in (70000, -1, "x")),
+    ],
+)
+def test_an_invalid_address_or_port_is_refused(values, robot, named):
+    with pytest.raises(StartError, match=named):
+        config(**values).interfaces(robot)
 
 
 def test_an_exposed_address_needs_insecure():

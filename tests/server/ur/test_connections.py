@@ -1,7 +1,7 @@
 """The limit of connections: silent clients are displaced, and some connections are reserved."""
 
 import asyncio
-import struct
+import contextlib
 
 from tvist_server.gateways.ur.connection import (
     LOCAL_PLACES,
@@ -11,32 +11,14 @@ from tvist_server.gateways.ur.connection import (
 )
 
 from . import rtde_client
-from .served_controller import PATIENCE, connect, connect_and_greet, lines, until
+from .served_controller import PATIENCE, connect, connect_and_greet, lines, package, rtde, until
 
 
 async def is_cut_off(reader):
     """Return True when the robot has closed a connection; fail if it stays open."""
-    try:
-        async with asyncio.timeout(PATIENCE):
-            await reader.read()
-    except ConnectionError:
-        pass
+    with contextlib.suppress(ConnectionError):
+        await asyncio.wait_for(reader.read(), PATIENCE)
     return True
-
-
-async def package(reader):
-    """Return the type of the next RTDE package."""
-    head = await asyncio.wait_for(reader.readexactly(3), PATIENCE)
-    await reader.readexactly(struct.unpack(">H", head[:2])[0] - 3)
-    return head[2:]
-
-
-async def rtde(served):
-    """Connect an RTDE client that receives samples."""
-    reader, writer = await connect(served, "rtde")
-    writer.write(rtde_client.version() + rtde_client.outputs(["timestamp"]) + rtde_client.package("S"))
-    assert [await package(reader) for _ in range(3)] == [b"V", b"O", b"S"]
-    return reader, writer
 
 
 async def dashboard(served):

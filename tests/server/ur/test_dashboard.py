@@ -25,15 +25,10 @@ def at(tick=100, **values):
     return SimpleNamespace(state=SimpleNamespace(tick=tick), **(known | values))
 
 
-def moved_to(robot, **values):
-    """Change the modes of the robot's last tick."""
-    robot.latest = at(**values)
-
-
 @pytest.fixture
 def ur_robot(robot):
     """The robot, running and at rest."""
-    moved_to(robot)
+    robot.latest = at()
     return host(robot)
 
 
@@ -91,7 +86,7 @@ quit -> Disconnected
 def test_answers_are_those_that_clients_compare(robot, control):
     asked = set()
     for line in MATCHED:
-        moved_to(robot)
+        robot.latest = at()
         said, answer = line.split(" -> ")
         (heard,) = LineClient(DashboardSession, host(robot), control).send(said + "\r\n")
         assert re.fullmatch(answer, heard), line
@@ -117,7 +112,7 @@ POWER = [
 
 def test_power_and_safety_commands_fail_without_control(client, control, ur_robot):
     for asked, safety, command in POWER:
-        moved_to(ur_robot, safety_mode=safety, safety_status=safety)
+        ur_robot.latest = at(safety_mode=safety, safety_status=safety)
         control.reply = Done()
         assert not client.ask(asked).startswith("Failed")
         assert control.commands[-1] == command
@@ -145,7 +140,7 @@ def test_programs_and_modes_do_not_change_without_control(client, control, ur_ro
 def test_power_on_twice_succeeds_and_a_stopping_arm_cannot_be_unlocked(client, control, ur_robot):
     control.refuse("wrong_mode", why="it moves")
     assert client.send("power on\nbrake release\n") == ["Powering on", "Brake releasing"]
-    moved_to(ur_robot, safety_mode=3, safety_status=3)
+    ur_robot.latest = at(safety_mode=3, safety_status=3)
     assert client.ask("unlock protective stop").startswith("Cannot unlock protective stop until 5s after")
 
 
@@ -155,10 +150,10 @@ SAFETY_MODES = {2: "REDUCED", 3: "PROTECTIVE_STOP", 5: "SAFEGUARD_STOP", 7: "ROB
 
 def test_modes_have_ur_s_names(client, ur_robot):
     for number, name in ROBOT_MODES.items():
-        moved_to(ur_robot, robot_mode=number)
+        ur_robot.latest = at(robot_mode=number)
         assert client.ask("robotmode") == f"Robotmode: {name}"
     for number, name in SAFETY_MODES.items():
-        moved_to(ur_robot, safety_mode=number, safety_status=number)
+        ur_robot.latest = at(safety_mode=number, safety_status=number)
         assert client.send("safetymode\nsafetystatus\n") == [f"Safetymode: {name}", f"Safetystatus: {name}"]
     ur_robot.latest = None
     assert client.ask("robotmode") == "Robotmode: NO_CONTROLLER"
@@ -207,7 +202,7 @@ PLAYING, STOPPING, STOPPED = 2, 0, 1
 def test_stop_and_load_are_answered_once_the_arm_is_at_rest(client, control, ur_robot, asked, answer):
     control.reply = Accepted(id=7)
     client.send("load Q2.urp\nplay\n")
-    moved_to(ur_robot, runtime_state=PLAYING)
+    ur_robot.latest = at(runtime_state=PLAYING)
     assert client.send(asked + "\nrobotmode\n") == []
     for tick, runtime in enumerate((PLAYING, STOPPING, STOPPING), start=101):
         assert client.session.sample(at(tick, runtime_state=runtime)) == b""
@@ -217,7 +212,7 @@ def test_stop_and_load_are_answered_once_the_arm_is_at_rest(client, control, ur_
 
 
 def test_stop_fails_if_the_arm_does_not_come_to_rest(client, ur_robot):
-    moved_to(ur_robot, runtime_state=PLAYING)
+    ur_robot.latest = at(runtime_state=PLAYING)
     client.send("stop\n")
     client.session.sample(at(2599, runtime_state=PLAYING))
     assert client.heard() == []

@@ -10,16 +10,19 @@ import weakref
 from types import SimpleNamespace
 
 import pytest
+from tests.controller.cells import a_cell
 from tests.controller.robots import UR5E
 
+from tvist_controller.cell.live_cell import LiveCell
 from tvist_controller.instruments.snapshot import Instruments
+from tvist_plant.flexible_arm import FlexibleArm
 from tvist_protocol.codec import encode
 from tvist_protocol.programs import ProgramStop
 from tvist_server.gateways.base import GatewayError
 from tvist_server.gateways.ur.interfaces import UrInterfaces
 
 from . import rtde_client
-from .served_controller import PATIENCE, connect, connect_and_greet, lines, until
+from .served_controller import PATIENCE, connect, connect_and_greet, lines, rtde, until
 
 
 async def test_every_port_answers_in_its_protocol(served):
@@ -86,9 +89,8 @@ async def test_a_port_in_use_is_refused_with_the_next_step(served):
 async def test_a_file_that_blocks_delays_no_other_client_and_no_stop(served):
     """A stop takes effect even behind the file and many questions of the same client."""
     read = threading.Event()
-    served.interfaces.robot.programs._external._folder = SimpleNamespace(
-        read=lambda _: "sync()" if read.wait(PATIENCE) else None
-    )
+    folder = SimpleNamespace(read=lambda _: "sync()" if read.wait(PATIENCE) else None)
+    served.interfaces.robot.programs._external._folder = folder
     (_, loads), other = await connect_and_greet(served), await connect_and_greet(served)
     loads.write(b"load a.urp\n" + 200 * b"robotmode\n" + b"stop\n")
     await until(lambda: isinstance(getattr(served, "last", None), ProgramStop))
@@ -144,12 +146,31 @@ async def test_reading_is_paused_while_many_commands_wait(served, monkeypatch):
     assert 1 < most < 100
 
 
+MANY = 300  # requests at once: more than may wait for their answers
+
+
+async def test_many_requests_to_the_gripper_are_answered_in_order(make_served):
+    plant, terminals = FlexibleArm(UR5E, UR5E.payload), SimpleNamespace(set_tcp=print)
+    cell, waiting = LiveCell(a_cell(), UR5E, plant, terminals, print), []
+    served = make_served({"gripper": 0}, gripper=lambda *asked: waiting.append(asked))
+    await served.tick()
+    await served.interfaces.open()
+    reader, writer = await connect(served, "gripper")
+    writer.write(b"".join(b"SET POS %d\nGET PRE\n" % (number % 256) for number in range(MANY)))
+    expected = b"".join(b"ackPRE %d\n" % (number % 256) for number in range(MANY))
+    reading, most = asyncio.create_task(reader.readexactly(len(expected))), 0
+    while not reading.done():
+        await until(lambda: waiting or reading.done())
+        most = max(most, len(waiting))
+        while waiting:
+            request, answer = waiting.pop(0)
+            answer(cell.answer(request))
+    assert await reading == expected
+    assert 0 < most < MANY
+
+
 async def test_a_tick_leaves_no_reference_cycles(served):
-    reader, writer = await connect(served, "rtde")
-    recipe = rtde_client.outputs(["actual_q", "target_current", "output_int_register_3"])
-    writer.write(rtde_client.version() + recipe + rtde_client.package("S"))
-    for _ in range(3):
-        await reader.readexactly(struct.unpack(">H", await reader.readexactly(2))[0] - 2)
+    await rtde(served, ["actual_q", "target_current", "output_int_register_3"])
     gc.collect()
     gc.disable()
     try:

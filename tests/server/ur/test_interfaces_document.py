@@ -9,9 +9,8 @@ from tvist_server.gateways.ur.primary.packages import robot_state
 from .decoders import parts, split
 
 PAGE = (Path(__file__).parents[3] / "docs/reference/ur-interfaces.md").read_text(encoding="utf-8")
-ROWS = [
-    [cell.strip() for cell in line.strip("|").split("|")] for line in PAGE.splitlines() if line[:1] == "|"
-]
+LINES = [line.strip("|") for line in PAGE.splitlines() if line[:1] == "|"]
+ROWS = [[cell.strip() for cell in line.split("|")] for line in LINES]
 
 
 def test_every_dashboard_command_has_a_row():

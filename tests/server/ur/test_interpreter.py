@@ -104,9 +104,8 @@ def test_statements_are_sent_one_after_the_other(client, control):
 @examples(40)
 @given(data=st.binary(max_size=300), cut=st.integers(0, 300))
 def test_random_bytes_do_not_break_a_session(data, cut):
-    client = LineClient(
-        InterpreterSession, SimpleNamespace(programs=Programs(None, external())), FakeControl()
-    )
+    robot = SimpleNamespace(programs=Programs(None, external()))
+    client = LineClient(InterpreterSession, robot, FakeControl())
     client.session.receive(data[:cut])
     client.session.receive(data[cut:])
     client.session.receive(b"\nstateunexecuted\n")

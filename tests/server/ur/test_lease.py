@@ -20,10 +20,8 @@ class Host:
         self.connection, self.other = ConnectionControl(self.lease), ConnectionControl(self.lease)
 
     def slow(self, fraction, connection=None):
-        command = (connection or self.connection).change(
-            lambda token: c.SetSpeed(token=token, fraction=fraction)
-        )
-        hear(command, self.replies)
+        control = connection or self.connection
+        hear(control.change(lambda token: c.SetSpeed(token=token, fraction=fraction)), self.replies)
 
     def taken_by(self, client):
         """Take control for a client outside the interfaces; return its token."""

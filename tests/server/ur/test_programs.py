@@ -40,9 +40,8 @@ def test_clients_get_key_messages_when_programs_start_and_stop(programs, robot):
 
 def test_a_label_is_sent_once_when_it_is_reached(programs, robot):
     for number, name in ((1, "Robot Program"), (1, "Robot Program"), (2, "Waypoint_1")):
-        programs.io(
-            io(program="f", program_state="PLAYING", program_label=ProgramLabel(number=number, name=name))
-        )
+        label = ProgramLabel(number=number, name=name)
+        programs.io(io(program="f", program_state="PLAYING", program_label=label))
     programs.io(io(program="f"))
     assert [(one.kind, one.values) for one in told(robot)] == [
         (1, {"number": 1, "text": "Robot Program"}),
@@ -55,8 +54,7 @@ def test_a_warning_with_a_line_becomes_a_runtime_exception(programs, robot):
     programs.event(Event(tick=5, kind="warning", why=why, line=3, column=5, program="prog"))
     programs.event(Event(tick=5, kind="warning", why="something else"))
     (exception,) = told(robot)
-    assert exception.kind == 10
-    assert exception.values == {"line": 3, "column": 5, "text": why}
+    assert (exception.kind, exception.values) == (10, {"line": 3, "column": 5, "text": why})
 
 
 def test_texts_and_popups_of_programs_are_sent_to_all_clients(programs, robot):
@@ -67,9 +65,8 @@ def test_texts_and_popups_of_programs_are_sent_to_all_clients(programs, robot):
     text, *popups = told(robot)
     assert (text.kind, text.values["text"]) == (0, "half way")
     assert [popup.values["flags"] for popup in popups] == [[True, False, True], [False, True, False]]
-    assert {(popup.values["title"], popup.values["text"]) for popup in popups} == {
-        ("Robot", "Put the part in")
-    }
+    words = {(popup.values["title"], popup.values["text"]) for popup in popups}
+    assert words == {("Robot", "Put the part in")}
 
 
 def run(programs, control, text="def f():\nend\n", *, secondary=False):

@@ -2,7 +2,6 @@
 
 import re
 import struct
-from pathlib import Path
 
 import pytest
 from tests.controller.robots import cut
@@ -10,17 +9,7 @@ from tests.controller.robots import cut
 from tvist_server.gateways.ur.realtime import RealtimeSession, package
 
 from .hosts import host
-
-PAGE = Path(__file__).parents[3] / "docs/reference/ur-interfaces.md"
-
-
-@pytest.fixture(scope="module")
-def documented():
-    """First and last number of each value in the package, and its name, empty if it is reserved."""
-    words = " ".join(PAGE.read_text(encoding="utf-8").split())
-    layout = words.partition(" (reserved ones are 0): ")[2].partition(".")[0]
-    rows = re.findall(r"(\d+)(?:–(\d+))? (?:`(\w+)`|reserved)(?:, |$)", layout)
-    return [(int(first), int(last or first), name) for first, last, name in rows]
+from .test_interfaces_document import PAGE
 
 
 def doubles(data: bytes):
@@ -29,14 +18,17 @@ def doubles(data: bytes):
     return struct.unpack(">152d", data[4:])
 
 
-def test_values_are_at_their_documented_places(documented, snapshots):
+def test_values_are_at_their_documented_places(snapshots):
+    layout = " ".join(PAGE.split()).partition(" (reserved ones are 0): ")[2].partition(".")[0]
+    rows = re.findall(r"(\d+)(?:–(\d+))? (?:`(\w+)`|reserved)(?:, |$)", layout)
     for snapshot in snapshots[::10]:
         expected = []
-        for first, last, name in documented:
-            assert first == len(expected)
-            value = getattr(snapshot, name) if name else [0.0] * (last - first + 1)
+        for first, last, name in rows:
+            assert int(first) == len(expected)
+            count = int(last or first) + 1 - int(first)
+            value = getattr(snapshot, name) if name else [0.0] * count
             expected += value if isinstance(value, list) else [value]
-            assert len(expected) == last + 1, name
+            assert len(expected) == int(first) + count, name
         assert list(doubles(package(snapshot))) == expected
 
 

@@ -177,5 +177,5 @@ def test_names_are_split_at_commas(names):
 
 def test_the_reference_page_of_variables_is_up_to_date():
     assert PAGE.read_text(encoding="utf-8") == page(), (
-        f"run `python -m tvist_server.gateways.ur.rtde.table > {PAGE.relative_to(PAGE.parents[2])}`"
+        f"python -m tvist_server.gateways.ur.rtde.table > {PAGE}"
     )

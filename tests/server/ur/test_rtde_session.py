@@ -78,11 +78,6 @@ def one(robot, control):
     return Client(robot, control)
 
 
-@pytest.fixture
-def other(robot, control):
-    return Client(robot, control)
-
-
 def test_only_protocol_versions_1_and_2_are_accepted(one):
     for payload in (*(struct.pack(">H", number) for number in range(5)), b"", b"\x00"):
         spoken = payload in {b"\x00\x01", b"\x00\x02"}
@@ -171,14 +166,14 @@ def test_samples_pause_and_resume_with_the_newest_recipe(one, snapshots):
     assert client.decoded(one.session.sample(snapshots[25]), ["robot_mode"]) == {"robot_mode": 7}
 
 
-def test_an_input_belongs_to_one_connection_until_it_closes(one, other, robot, control):
+def test_an_input_belongs_to_one_connection_until_it_closes(one, robot, control):
+    other, third = Client(robot, control), Client(robot, control)
     one.with_inputs(ints[:3], ints[:3])  # as many recipes of its own as it likes
     one.say(client.inputs([ints[4], "nonsense"]))  # a wrong recipe owns nothing
     other.say(client.version())
     assert other.say(client.inputs([ints[4], ints[1]])) == [("I", b"\x00INT32,IN_USE")]
     assert other.say(client.inputs(ints[3:5])) == [("I", b"\x01INT32,INT32")]
     one.session.closed()
-    third = Client(robot, control)
     third.say(client.version())
     assert third.say(client.inputs(ints[2:4])) == [("I", b"\x00INT32,IN_USE")]
     assert third.say(client.inputs(ints[:3])) == [("I", b"\x01INT32,INT32,INT32")]
@@ -194,12 +189,12 @@ def test_speed_and_outputs_are_in_use_while_another_client_has_control(one, cont
     assert one.say(client.inputs(names))[0][1][0] == 2
 
 
-def test_reserved_inputs_are_in_use_for_every_client(one, other, robot):
+def test_reserved_inputs_are_in_use_for_every_client(one, robot, control):
     reserved = matching(("speed_slider_*", "input_int_register_[0-9]"))
     assert set(reserved) == {*SPEED, *ints[:10]}
     assert matching(("speed_slider_*", "input_int_register_[0-9]")) is reserved
     robot.inputs.take(reserved, "a fieldbus")
-    for client_ in (one, other):
+    for client_ in (one, Client(robot, control)):
         client_.say(client.version())
         wanted = ["speed_slider_mask", "standard_digital_output", ints[9], ints[10]]
         assert client_.say(client.inputs(wanted)) == [("I", b"\x00IN_USE,UINT8,IN_USE,INT32")]
@@ -212,8 +207,7 @@ def shown(robot, **changes):
 
 
 SPEED = ("speed_slider_mask", "speed_slider_fraction")
-GROUPS = ("standard", "configurable", "tool")
-DIGITAL = tuple(f"{group}_digital_output{part}" for group in GROUPS for part in ("_mask", ""))
+DIGITAL = tuple(client.BYTES)
 ANALOG = tuple(f"standard_analog_output_{part}" for part in ("mask", "type", "0", "1"))
 MASKS = [name for name in (*DIGITAL, *ANALOG) if name.endswith("_mask")]
 SIX = {"input_double_register": [1.0, 2.0, 3.0, 4.0, 5.0, 6.0] + [0.0] * 42}
@@ -309,11 +303,8 @@ def test_watched_registers_are_sent_every_time(one, robot):
 def test_registers_of_a_package_are_one_command(one):
     names = [ints[0], ints[1], ints[7], doubles[0], "input_bit_register_64"]
     one.with_inputs(names)
-    also = (
-        Registers(bank="input_int", first=7, values=(1,)),
-        Registers(bank="input_double", first=0, values=(1.0,)),
-        Registers(bank="input_bit", first=64, values=(True,)),
-    )
+    places = (("input_int", 7, 1), ("input_double", 0, 1.0), ("input_bit", 64, True))
+    also = tuple(Registers(bank=name, first=first, values=(value,)) for name, first, value in places)
     command = SetRegisters(bank="input_int", first=0, values=(1, 1), also=also)
     assert one.put(1, names, 1, 1, 1, 1.0, True) == [command]
 
