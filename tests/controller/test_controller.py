@@ -16,16 +16,16 @@ from tvist_protocol.replies import Accepted, Done
 from tvist_protocol.simulation import SimulationReset
 from tvist_protocol.stream import State
 
-from .robots import Q1, Q2, Q3, UR5E, Robot, bits, calibration, cut, setup
+from .robots import Q1, Q2, Q3, ROUNDING, UR5E, H, Robot, bits, calibration, cut, setup
 
 Q1_, Q2_, Q3_ = tuple(Q1), tuple(Q2), tuple(Q3)
 DISC = paper_payload(UR5E)
 
 
-def moving(robot: Robot) -> int:
+def moving(robot: Robot, ticks: int = 200) -> int:
     """Start a move and let it run for some ticks; return its number."""
     accepted = robot.send(c.MoveJ, q=Q3_)
-    robot.tick(200)
+    robot.tick(ticks)
     return accepted.id
 
 
@@ -102,6 +102,20 @@ def test_a_reset_in_motion_stops_it_and_restores_the_initial_state():
         assert (robot.column(name) == fresh.column(name)).all()
 
 
+def test_an_expired_lease_stops_a_moving_arm():
+    robot = Robot(clock="realtime", lease_s=1.0)
+    motion = moving(robot, 501)
+    told = [(event.kind, event.id, event.tick) for event in robot.events[1:]]
+    assert told == [("lease_lost", None, 501), ("motion_stopped", motion, 501)]
+    robot.until_rest()
+    hardest, q = min(UR5E.limits.acceleration), robot.column("target_q")
+    assert np.abs(robot.column("target_qdd")).max() <= hardest + ROUNDING
+    assert np.abs(np.diff(q, 2, axis=0)).max() / H**2 <= hardest + ROUNDING
+    assert robot.tick(300).target_q == q[-1].tolist()
+    assert robot.send(c.KeepAlive).code == "no_control"
+    assert robot.send(c.TakeControl, client="b").token
+
+
 def test_missed_ticks_are_published(robot):
     robot.controller.counters.missed_ticks += 3
     assert robot.tick().missed_ticks == 3
@@ -125,6 +139,7 @@ def test_robots_with_fewer_joints_support_all_basic_commands(joints):
     robot.stream(50, period=0.008)
     assert robot.send(c.ServoStop) == Done()
     assert robot.until_rest().setpoint_sequence is None
+    assert robot.kinds().count("stream_stopped") == 1
     robot.send(c.MoveJ, q=tuple(-angle for angle in target))
     robot.tick(100)
     assert robot.send(c.Stop) == Done()
