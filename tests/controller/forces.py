@@ -7,10 +7,11 @@ from tvist_controller.kinematics.arm import Arm
 from tvist_plant.description import Payload as Body
 from tvist_plant.plant import GRAVITY, Measurement
 from tvist_protocol import forces as f
+from tvist_protocol.replies import Done
 from tvist_protocol.values import Payload
 
 from .robots import UR5E, NoArm, Robot
-from .scripts import URSIM
+from .scripts import URSIM, failure, playing, start
 
 KINEMATICS = Arm(UR5E)
 NOTHING = Payload(mass=0.0, com=(0.0, 0.0, 0.0), inertia=(0.0,) * 6)
@@ -58,6 +59,17 @@ def pressed(robot, plant, ticks):
     for _ in range(ticks):
         robot.tick()
         forces.append(plant.force[2])
+    return np.array(forces)
+
+
+def finished(robot, plant, *lines, most=6000):
+    """Run a program; return the force of the surface in each tick."""
+    assert start(robot, *lines) == Done()
+    forces = []
+    while playing(robot):
+        forces.append(pressed(robot, plant, 1)[0])
+        assert len(forces) < most
+    assert failure(robot) is None, failure(robot)
     return np.array(forces)
 
 

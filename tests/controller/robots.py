@@ -4,7 +4,6 @@ import msgspec
 import numpy as np
 
 from tvist_controller.controller import Controller
-from tvist_controller.foresight.stopper import Stopper
 from tvist_controller.instruments.report import Sink
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.limits import StreamTorqueMargin
@@ -35,7 +34,8 @@ def cut(joints: int) -> RobotDescription:
     changes = {"robot": replace(UR5E.robot, model=f"UR5e-{joints}", joints=names)}
     for table in ("kinematics", "links", "limits", "drives"):
         values = getattr(UR5E, table)
-        shorter = {key: value[:joints] for key, value in each(values) if isinstance(value, tuple)}
+        columns = {name: getattr(values, name) for name in values.__struct_fields__}
+        shorter = {name: value[:joints] for name, value in columns.items() if isinstance(value, tuple)}
         changes[table] = replace(values, **shorter)
     flexible = UR5E.link_flexibility
     kept = [number for number in flexible.links if number < joints]
@@ -45,10 +45,6 @@ def cut(joints: int) -> RobotDescription:
     changes["collision"] = type(UR5E.collision)()  # such an arm would carry its payload inside itself
     changes["poses"] = {name: pose[:joints] for name, pose in UR5E.poses.items()}
     return replace(UR5E, **changes)
-
-
-def each(struct):
-    return [(key, getattr(struct, key)) for key in struct.__struct_fields__]
 
 
 POLYNOMIAL = {
@@ -107,13 +103,6 @@ def cycle(name: str = "zv", q=Q1, estimator=None, seed: int = 0, plant: Plant | 
     return Line(UR5E, tvist, q=np.array(q), declared=payload, carried=payload, seed=seed, plant=plant)
 
 
-def stop(line: Line, deceleration: float | None):
-    """Stop a line; return the plan, or None if a stop goes on."""
-    if not hasattr(line, "stopper"):
-        line.stopper = Stopper(line)
-    return line.stopper.stop(deceleration)
-
-
 class NoArm:
     """A plant that follows its commands exactly."""
 
@@ -140,11 +129,12 @@ def setup(description: RobotDescription = UR5E, **changes) -> Setup:
 
 
 class Kept(Sink):
-    """Keeps events, journal and states."""
+    """Keeps events, journal, states and errors."""
 
     def __init__(self) -> None:
-        self.events, self.entries, self.states = [], [], []
-        self.event, self.journal, self.state = self.events.append, self.entries.append, self.states.append
+        self.events, self.entries, self.states, self.errors = [], [], [], []
+        self.event, self.journal = self.events.append, self.entries.append
+        self.state, self.raised = self.states.append, self.errors.append
 
 
 class Robot:

@@ -62,10 +62,8 @@ def assert_within(out, limits=PAPER, *, beyond=(1e-5, 1e-4)):
 def there_and_back(limits: MotionLimits, way=(1.4, -1.0, 0.8, -0.5, 0.3, 2.0), dwell=0.3):
     """Return positions by time of double-S motions to and fro with rests in between."""
     target, start = np.array(way), np.zeros(len(way))
-    go, back = (
-        quickest_motion(JointLine(start, target), limits),
-        quickest_motion(JointLine(target, start), limits),
-    )
+    go = quickest_motion(JointLine(start, target), limits)
+    back = quickest_motion(JointLine(target, start), limits)
     turn, cycle = go.duration + dwell, 2 * (go.duration + dwell)
 
     def at(time):

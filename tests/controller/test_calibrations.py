@@ -3,6 +3,7 @@
 import msgspec
 import numpy as np
 import pytest
+from tests.plant.arms import changed
 
 from tvist_controller.about import info_of
 from tvist_controller.setup import body, paper_payload
@@ -16,19 +17,9 @@ from tvist_shaping.errors import EstimatorError
 
 from .robots import Q3, UR5E, H, Robot
 
-REPLACE = msgspec.structs.replace
 SHIPPED = [load_robot(name) for name in robots()]
-SOFT = REPLACE(
-    UR5E, drives=REPLACE(UR5E.drives, gear_stiffness=tuple(0.5 * k for k in UR5E.drives.gear_stiffness))
-)
-RENAMED = REPLACE(
-    UR5E, robot=REPLACE(UR5E.robot, name="left"), limits=REPLACE(UR5E.limits, position=(3.2,) * 6)
-)
-
-
-def warnings(robot):
-    robot.tick()
-    return robot.warnings()
+SOFT = changed(UR5E, "drives", gear_stiffness=tuple(0.5 * k for k in UR5E.drives.gear_stiffness))
+RENAMED = changed(changed(UR5E, "robot", name="left"), "limits", position=(3.2,) * 6)
 
 
 @pytest.mark.parametrize("name", available())
@@ -41,8 +32,9 @@ def test_shipped_calibrations_match_their_robot_file(name):
 @pytest.mark.parametrize(("arm", "fits"), [(RENAMED, True), (SOFT, False)], ids=["renamed", "softer"])
 def test_only_a_calibration_of_another_arm_causes_a_warning_at_start(arm, fits):
     robot = Robot(arm, calibration=load("ur5e_5kg"))
+    robot.tick()
     words = "'ur5e_5kg' was measured on a different arm", "tvist identify"
-    assert [all(one in why for one in words) for why in warnings(robot)] == [True] * (not fits)
+    assert [all(one in why for one in words) for why in robot.warnings()] == [True] * (not fits)
     assert info_of(robot.controller).calibration.fits_arm is fits
 
 
@@ -68,10 +60,8 @@ def test_the_shipped_modal_model_matches_the_true_modes_with_any_payload(shipped
 
 
 def test_a_calibration_without_the_needed_model_or_of_another_arm_is_refused(shipped):
-    for wrong, words in (
-        (REPLACE(shipped, robot="UR10e"), "'UR5e', which this arm"),
-        (load("ur5e_5kg"), "tvist identify"),
-    ):
+    foreign = msgspec.structs.replace(shipped, robot="UR10e")
+    for wrong, words in ((foreign, "'UR5e', which this arm"), (load("ur5e_5kg"), "tvist identify")):
         with pytest.raises(EstimatorError, match=words):
             modal_estimator(wrong, UR5E, paper_payload(UR5E))
     with pytest.raises(EstimatorError, match="polynomial"):
@@ -83,7 +73,7 @@ def test_a_missing_or_repeated_parameter_is_refused_by_name(shipped, quantity):
     known = shipped.modal.parameters
     one = [parameter for parameter in known if parameter.quantity == quantity]
     for parameters in (tuple(other for other in known if other not in one), (*known, one[0])):
-        wrong = REPLACE(shipped, modal=REPLACE(shipped.modal, parameters=parameters))
+        wrong = changed(shipped, "modal", parameters=parameters)
         with pytest.raises(EstimatorError, match=f"{quantity} of joints"):
             modal_estimator(wrong, UR5E, paper_payload(UR5E))
 
@@ -91,12 +81,8 @@ def test_a_missing_or_repeated_parameter_is_refused_by_name(shipped, quantity):
 ONE_JOINT = load_robot("one-joint")
 
 
-@pytest.fixture
-def robot():
-    return Robot(ONE_JOINT, calibration=load(default_for(ONE_JOINT.robot.model)))
-
-
-def test_the_default_calibration_belongs_to_the_robot_model(robot):
+def test_the_default_calibration_belongs_to_the_robot_model():
+    robot = Robot(ONE_JOINT, calibration=load(default_for(ONE_JOINT.robot.model)))
     assert info_of(robot.controller).calibration.fits_arm is True
     assert info_of(robot.controller).poses == ONE_JOINT.poses
     assert (default_for("UR5e"), default_for("nobody's arm")) == ("ur5e_5kg", None)

@@ -17,9 +17,8 @@ from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_protocol.simulation import SimulationReset
 from tvist_protocol.values import Payload as Carried
 
-from .robots import UR5E, Robot
+from .robots import Q2, UR5E, Robot
 
-Q1, Q2, Q3 = (np.array(UR5E.poses[name]) for name in ("Q1", "Q2", "Q3"))
 DOWN = np.array([0.0, 0.6, 0.0, -1.57, 0.0, 0.0])
 """The upper arm points below the horizon."""
 
@@ -101,9 +100,6 @@ def test_a_colliding_move_is_refused_with_bodies_and_time(robot):
     assert reply.code == "collision"
     assert "floor" in reply.why
     assert "s after the start" in reply.why
-    before = robot.states[-1].target_q if robot.states else None
-    robot.tick(50)
-    assert before is None or robot.states[-1].target_q == before
     assert robot.send(c.MoveJ, q=tuple(Q2)) == Accepted(id=1)
 
 
@@ -125,19 +121,17 @@ def test_a_path_out_of_a_collision_brings_no_pair_of_bodies_closer(model, number
     assert nearer < 1e-3 if model.on_way(way) is None else nearer > 0.0
 
 
-PAYLOADS = {
-    "the paper's": {"mass": 5.0, "com": UR5E.payload.com},
-    "far out": {"mass": 2.0, "com": (0.1, -0.2, 0.2)},
-}
 INERTIA = (0.01, 0.0, 0.0, 0.01, 0.0, 0.01)
 
 
-@pytest.mark.parametrize(("name", "payload"), [("ur5e", "the paper's"), ("ur30", "far out")])
-def test_a_reset_into_a_collision_is_refused_with_posture_and_bodies(name, payload):
+@pytest.mark.parametrize(
+    ("name", "mass", "com"), [("ur5e", 5.0, UR5E.payload.com), ("ur30", 2.0, (0.1, -0.2, 0.2))]
+)
+def test_a_reset_into_a_collision_is_refused_with_posture_and_bodies(name, mass, com):
     arm, robot = load(name), Robot(description=load(name))
-    declared = PAYLOADS[payload] | {"mass": min(PAYLOADS[payload]["mass"], arm.limits.payload)}
-    assert robot.send(c.SetPayload, **declared, inertia=INERTIA) == Done()
-    model = CollisionModel(arm, Payload(**declared, inertia=INERTIA))
+    declared = {"mass": mass, "com": com, "inertia": INERTIA}
+    assert robot.send(c.SetPayload, **declared) == Done()
+    model = CollisionModel(arm, Payload(**declared))
     refused = 0
     for number in range(40):
         q = turned_wrists(number)

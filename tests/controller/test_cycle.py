@@ -80,19 +80,10 @@ def test_mode_changes_follow_the_table():
                     check_change(before, after, guarded=True)
 
 
-FIELDS = ("q", "qd", "qdd")
-
-
-def unshaped(state):
-    """Return position, velocity and acceleration before shaping, by default those of the target."""
-    return [
-        own if (own := getattr(state, f"unshaped_{name}")) is not None else getattr(state, f"target_{name}")
-        for name in FIELDS
-    ]
-
-
-def column(states, number):
-    return np.array([unshaped(state)[number] for state in states])
+def unshaped(states, name):
+    """Return position, velocity or acceleration before shaping, by default that of the target."""
+    pairs = ((getattr(state, f"unshaped_{name}"), getattr(state, f"target_{name}")) for state in states)
+    return np.array([target if own is None else own for own, target in pairs])
 
 
 def line(robot):
@@ -115,27 +106,22 @@ def stream(robot):
 MOTIONS = {"joints": (Q1, joints), "line": (BENT, line), "stream": (Q1, stream)}
 
 
-def moved(motion, shaper, *, rest=50):
+@pytest.mark.parametrize("motion", MOTIONS)
+@pytest.mark.parametrize("shaper", ["zv", "ei"])
+def test_unshaped_values_are_central_differences_of_the_reference(motion, shaper):
     start, begin = MOTIONS[motion]
     robot = Robot(q=tuple(start), shaper=shaper)
     robot.tick(5)
     begin(robot)
     robot.until_rest()
-    robot.tick(rest)
-    return robot
-
-
-@pytest.mark.parametrize("motion", MOTIONS)
-@pytest.mark.parametrize("shaper", ["zv", "ei"])
-def test_unshaped_values_are_central_differences_of_the_reference(motion, shaper):
-    states = moved(motion, shaper).states
+    robot.tick(50)
+    states = robot.states
     reference = np.array([state.reference_q for state in states])
     assert np.abs(reference - np.array([state.target_q for state in states])).max() > 1e-3
-    for number, expected in enumerate(central_differences(reference)):
+    for name, expected in zip(("q", "qd", "qdd"), central_differences(reference), strict=True):
         # Velocities are differences of neighbours here, which rounds in another way.
-        np.testing.assert_allclose(
-            column(states, number)[2:], expected, rtol=0.0, atol=(0.0, 1e-12, 0.0)[number]
-        )
+        rounding = 1e-12 if name == "qd" else 0.0
+        np.testing.assert_allclose(unshaped(states, name)[2:], expected, rtol=0.0, atol=rounding)
 
 
 @pytest.mark.parametrize("motion", ["joints", "line"])
@@ -150,7 +136,7 @@ def test_unshaped_values_join_the_shaped_ones_in_a_stop_without_peaks(motion):
     robot.until_rest()
     for state in robot.states[before:]:
         assert state.unshaped_q is state.unshaped_qd is None
-    velocity, acceleration = (np.abs(column(robot.states, number)).max() for number in (1, 2))
+    velocity, acceleration = (np.abs(unshaped(robot.states, name)).max() for name in ("qd", "qdd"))
     shaped = robot.column("target_qdd")
     assert velocity < 2.0
     assert acceleration <= max(np.abs(shaped).max(), 2.1)
@@ -219,20 +205,14 @@ def test_inverse_dynamics_matches_the_lagrange_equations(joints):
         )
 
 
-def command_of(controllers, target, torque, gravity):
-    command = np.empty((3, len(torque)))
-    command_drives(target.q, np.array([target.qd, target.qdd]), torque, gravity, controllers.rows, command)
-    return DriveCommand(*command)
-
-
 def commanded(description, *targets):
     """Return the last of several drive commands, with torques of inverse dynamics."""
     dynamics = InverseDynamics(description, body(paper_payload(description)))
-    controllers = DriveFeedForward(description)
+    rows, command = DriveFeedForward(description).rows, np.empty((3, description.joints))
     for target in targets:
         torque, gravity = dynamics.torque(target.q, target.qd, target.qdd), dynamics.gravity(target.q)
-        command = command_of(controllers, target, torque, gravity)
-    return command, torque, gravity
+        command_drives(target.q, np.array([target.qd, target.qdd]), torque, gravity, rows, command)
+    return DriveCommand(*command), torque, gravity
 
 
 def test_feed_forward_contains_rotor_inertia_and_part_of_coulomb_friction():

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.examples import examples
+from tests.plant.arms import changed
 
 from tvist_controller.kinematics.arm import InverseDynamics
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
@@ -86,18 +87,11 @@ def test_a_single_joint_leads_by_inertia_times_acceleration_over_stiffness():
 
 
 def test_elastic_feed_forward_ignores_springs_and_gains_of_the_robot_file():
-    replace, drives = msgspec.structs.replace, UR5E.drives
-    names = (
-        "gear_stiffness",
-        "gear_damping",
-        "velocity_gain",
-        "position_gain",
-        "integral_gain",
-        "windup_feedforward",
-    )
-    other = {name: tuple(3.0 * value for value in getattr(drives, name)) for name in names}
-    flexible = replace(UR5E.link_flexibility, stiffness=(1e3, 1e3), damping_time=1.0)
-    strange = replace(UR5E, drives=replace(drives, **other), link_flexibility=flexible)
+    gains = [f"{what}_gain" for what in ("velocity", "position", "integral")]
+    names = ["gear_stiffness", "gear_damping", *gains, "windup_feedforward"]
+    other = {name: tuple(3.0 * value for value in getattr(UR5E.drives, name)) for name in names}
+    strange = changed(UR5E, "link_flexibility", stiffness=(1e3, 1e3), damping_time=1.0)
+    strange = changed(strange, "drives", **other)
     commands = []
     for description in (UR5E, strange):
         feed, dynamics = stage(description), InverseDynamics(description, UR5E.payload)
@@ -135,12 +129,9 @@ def test_a_rough_lead_is_followed_with_limited_acceleration(seed, room):
     assert led == pytest.approx(smooth, abs=1e-15)
 
 
-@pytest.mark.parametrize(("mass", "start", "target"), [(5.0, Q3, Q2)])
-def test_elastic_shapers_leave_little_residual_vibration(mass, start, target):
+def test_elastic_shapers_leave_little_residual_vibration():
     clean = UR5E.clean()
-    left = {
-        name: ringing(line(name, start, mass=mass, description=clean), target) for name in ("none", *NAMES)
-    }
+    left = {name: ringing(line(name, Q3, mass=5.0, description=clean), Q2) for name in ("none", *NAMES)}
     assert left["elastic"] < 0.05 * left["none"]
     assert left["elastic-auto"] < 0.01 * left["none"]
     assert left["elastic-position"] < 0.25 * left["none"]
@@ -162,28 +153,17 @@ def test_an_elastic_shaper_publishes_motor_motion_within_torque_limits(name):
     assert robot.tick().motor_qd is None
 
 
-ACTS = (
-    *("stop", "payload", "pause", "resume", "slider", "move", "speed_j"),
-    *("none", "zv", "elastic", "elastic-auto"),
-)
-
-
-def act(robot, name, random):
-    if name == "stop":
-        robot.send(c.Stop)
-    elif name == "payload":
-        robot.send(c.SetPayload, **msgspec.structs.asdict(paper_payload(UR5E, random.uniform(0.0, 5.0))))
-    elif name in {"pause", "resume"}:
-        robot.send(c.Pause if name == "pause" else c.Resume)
-    elif name == "slider":
-        robot.send(c.SetSpeed, fraction=random.uniform(0.2, 1.0))
-    elif name == "move":
-        q = Q3 + random.uniform(0.1, 0.6) * (Q1 - Q3)
-        robot.send(c.MoveJ, q=tuple(q), velocity=2.0, acceleration=4.0, jerk=2000.0)
-    elif name == "speed_j":
-        robot.send(SpeedJ, qd=tuple(random.uniform(-0.3, 0.3, 6)), acceleration=5.0)
-    else:
-        robot.send(c.SetShaper, name=name)
+QUICK = {"velocity": 2.0, "acceleration": 4.0, "jerk": 2000.0}
+ACTS = {
+    c.Stop: lambda _: {},
+    c.SetPayload: lambda random: msgspec.structs.asdict(paper_payload(UR5E, random.uniform(0.0, 5.0))),
+    c.Pause: lambda _: {},
+    c.Resume: lambda _: {},
+    c.SetSpeed: lambda random: {"fraction": random.uniform(0.2, 1.0)},
+    c.MoveJ: lambda random: QUICK | {"q": tuple(Q3 + random.uniform(0.1, 0.6) * (Q1 - Q3))},
+    SpeedJ: lambda random: {"qd": tuple(random.uniform(-0.3, 0.3, 6)), "acceleration": 5.0},
+    c.SetShaper: lambda random: {"name": str(random.choice(["none", "zv", "elastic", "elastic-auto"]))},
+}
 
 
 @examples(4)
@@ -192,10 +172,11 @@ def test_motor_position_and_velocity_stay_continuous_through_random_commands(see
     random = np.random.default_rng(seed)
     robot = Robot(calibration=calibration(), shaper="elastic", q=tuple(Q3))
     commands = watched_commands(robot)
-    act(robot, "move", random)
+    robot.send(c.MoveJ, **ACTS[c.MoveJ](random))
     for _ in range(12):
         robot.tick(int(random.integers(2, 200)))
-        act(robot, str(random.choice(ACTS)), random)
+        kind = random.choice([*ACTS, *[c.SetShaper] * 3])  # a shaper as often as each of four other commands
+        robot.send(kind, **ACTS[kind](random))
     robot.send(c.Stop)
     robot.until_rest()
     q, qd = (np.array([getattr(command, name) for command in commands]) for name in ("q", "qd"))
@@ -208,9 +189,7 @@ def test_motor_position_and_velocity_stay_continuous_through_random_commands(see
 
 
 def test_a_lead_beyond_the_torque_limit_is_limited_and_reported():
-    weak = msgspec.structs.replace(
-        UR5E, limits=msgspec.structs.replace(UR5E.limits, torque=tuple(0.05 * t for t in UR5E.limits.torque))
-    )
+    weak = changed(UR5E, "limits", torque=tuple((0.05 * LIMIT).tolist()))
     feed, dynamics = stage(weak), InverseDynamics(weak, UR5E.payload)
     told = []
     for k in range(200):
@@ -255,21 +234,16 @@ LARGEST = STICKS.imperfections.stiction[0]
 
 def rigid(description: RobotDescription) -> RobotDescription:
     """Return the arm a hundred times as stiff, whose motors follow their commands."""
-    replace, drives, links = msgspec.structs.replace, description.drives, description.link_flexibility
-    stiff = replace(
-        drives,
-        gear_stiffness=tuple(100.0 * value for value in drives.gear_stiffness),
-        velocity_gain=tuple(100.0 * value for value in drives.velocity_gain),
-        windup_feedforward=(0.0,) * description.joints,
-        gear_error_amplitude=0.0,
-    )
-    own = description.imperfections
-    return replace(
-        description,
-        drives=stiff,
-        link_flexibility=replace(links, stiffness=tuple(100.0 * value for value in links.stiffness)),
-        imperfections=replace(own, stiction_stiffness=0.01 * own.stiction_stiffness),
-    )
+    drives, links = description.drives, description.link_flexibility
+    gears = {
+        name: tuple(100.0 * value for value in getattr(drives, name))
+        for name in ("gear_stiffness", "velocity_gain")
+    }
+    none = {"windup_feedforward": (0.0,) * description.joints, "gear_error_amplitude": 0.0}
+    stiff = changed(description, "drives", **gears, **none)
+    stiff = changed(stiff, "link_flexibility", stiffness=tuple(100.0 * value for value in links.stiffness))
+    softer = 0.01 * description.imperfections.stiction_stiffness
+    return changed(stiff, "imperfections", stiction_stiffness=softer)
 
 
 @pytest.mark.parametrize("limits", [PAPER, MotionLimits(0.05, 0.2, 10.0)], ids=["paper", "creeping"])
@@ -294,15 +268,7 @@ def test_fed_forward_stiction_equals_the_stiction_of_the_plant(limits, measured)
 
 
 def test_filters_with_known_friction_use_the_friction_of_the_robot_file():
-    for shaper in (
-        "auto",
-        "auto-target",
-        "short",
-        "elastic",
-        "elastic-16",
-        "elastic-auto",
-        "elastic-position",
-    ):
+    for shaper in ("auto", "auto-target", "short", "elastic-16", *NAMES):
         np.testing.assert_array_equal(planned(shaper, STICKS, STICKING).law, described_friction(STICKS))
     assert described_friction(STICKS).shape == (LAWS, STICKS.joints)
     for shaper in ("none", "zv", "ei"):  # the paper's controller keeps its share of Coulomb friction

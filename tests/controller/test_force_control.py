@@ -16,7 +16,7 @@ from tvist_protocol.replies import Accepted, Done, Refused
 from tvist_protocol.transitions import Activity
 from tvist_protocol.values import Payload
 
-from .forces import KINEMATICS, UR5E_IN_AIR, feeling, force_mode, places, pressed, touching
+from .forces import KINEMATICS, UR5E_IN_AIR, feeling, finished, force_mode, places, pressed, touching
 from .robots import H
 from .scripts import URSIM, failure, playing, said, start
 
@@ -136,17 +136,6 @@ def test_a_compliant_axis_keeps_its_speed_limit_and_stiff_axes_do_not_move():
     assert np.abs(way[:, :2]).max() < 1e-6
 
 
-def test_an_excessive_force_causes_a_protective_stop():
-    robot, plant = feeling()
-    plant.pushed[:3] = 200.0, 200.0, 0.0
-    robot.tick(5)
-    assert "protective_stop" not in robot.kinds()
-    robot.tick(5)
-    (event,) = robot.told("protective_stop")
-    assert event.code == "limit_force"
-    assert "above 250 N" in event.why
-
-
 def test_a_path_deviation_in_force_mode_causes_a_stop_that_names_the_axis():
     robot, plant = touching(0.0)
     force_mode(robot, limits=(0.1, 1e-4, 0.1, 0.5, 0.5, 0.5))
@@ -201,17 +190,6 @@ def test_freedrive_does_not_pass_a_singular_posture():
 
 
 MODE = "force_mode(p[0,0,0,0,0,0], [0,0,1,0,0,0], [0,0,{},0,0,0], 2, [2,2,1.5,1,1,1])"
-
-
-def finished(robot, plant, *lines, most=6000):
-    """Run a program; return the force of the surface in each tick."""
-    assert start(robot, *lines) == Done()
-    forces = []
-    while playing(robot):
-        forces.append(pressed(robot, plant, 1)[0])
-        assert len(forces) < most
-    assert failure(robot) is None, failure(robot)
-    return np.array(forces)
 
 
 def test_program_moves_in_force_mode_keep_the_force_and_arrive():

@@ -34,10 +34,6 @@ def activity(robot):
     return robot.controller.motion.activity
 
 
-def last(robot):
-    return robot.events[-1]
-
-
 @pytest.mark.parametrize("shaped", [False, True])
 def test_consecutive_guided_commands_are_one_motion_done_at_rest(shaped):
     arm = robot()
@@ -109,7 +105,7 @@ def test_servo_j_reaches_its_posture_with_hardly_any_overshoot(lookahead, gain, 
     gone = (arm.column("target_q")[:, 0] - HOME[0]) / way
     assert gone.max() <= 1.005
     assert arm.states[-1].target_q == [HOME[0] + way, *HOME[1:]]
-    assert last(arm).kind == "motion_done"
+    assert arm.kinds()[-1] == "motion_done"
 
 
 @pytest.mark.parametrize(

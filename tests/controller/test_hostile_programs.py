@@ -61,7 +61,7 @@ def spending(monkeypatch):
 @pytest.mark.parametrize("seed", [*range(4), 12, 93, 156])
 def test_no_tick_exceeds_the_evaluation_budget_with_hostile_programs(seed, monkeypatch):
     """All programs of a robot share the budget; the next tick pays for a statement that began late."""
-    robot, beside, _ = begin(seed)
+    robot, beside = begin(seed)
     spent = spending(monkeypatch)
     solved = Counts(monkeypatch, type(robot.controller.programs.arm._access.motion.cycle.dynamics), "inertia")
     total = 0
@@ -79,7 +79,7 @@ def test_no_tick_exceeds_the_evaluation_budget_with_hostile_programs(seed, monke
 @pytest.mark.parametrize("seed", [6, 81, 240, 490])
 def test_hostile_programs_cause_few_plans_and_stops(seed, monkeypatch):
     """Threads killed while they move, and short moves in quick succession, are delayed."""
-    robot, beside, _ = begin(seed)
+    robot, beside = begin(seed)
     plans, stops = Counts(monkeypatch, Planner, "plan"), Counts(monkeypatch, Stopper, "plan_stop")
     ticks, dear = 450, 0
     for _ in range(ticks):
@@ -99,15 +99,12 @@ def stopping(seed):
     random = np.random.default_rng(seed)
     head, body = Author(UR5E, np.array(URSIM), random).program("prog").split("\n", 1)
     end = ("thread t():", f"sleep({random.uniform(0.0, 0.3):.3f})", random.choice(ENDS), "end", "run t()")
-    writes = ("thread w():", "n = 0.0", "while True:", "n = (n + 0.001) - floor(n)")
-    writes += (
+    step = (
+        "n = (n + 0.001) - floor(n)",
         "write_output_float_register(1, n)",
         "set_standard_analog_out(0, n)",
-        "sync()",
-        "end",
-        "end",
-        "run w()",
     )
+    writes = ("thread w():", "n = 0.0", "while True:", *step, "sync()", "end", "end", "run w()")
     return "\n".join((head, *writes, *end, body))
 
 
@@ -174,21 +171,12 @@ def test_random_programs_with_odd_numbers_raise_no_exception(seeds, little_memor
         robot.until_rest(6000)
 
 
-class Heard(Kept):
-    """Keeps output and errors."""
-
-    def __init__(self):
-        super().__init__()
-        self.errors = []
-        self.raised = self.errors.append
-
-
 def fails(*_):
     raise ArithmeticError("on purpose")
 
 
 def test_a_failing_plan_ends_its_program_with_its_line_and_is_logged(monkeypatch):
-    robot, heard = a_robot(), Heard()
+    robot, heard = a_robot(), Kept()
     monkeypatch.setattr(robot.controller.plans, "_order", lambda *_: fails)
     start(robot, "sync()", "movel(p[0.1, -0.4, 0.3, 2, 2, 0])")
     host = Host(robot.controller, heard, survives=True)
@@ -201,7 +189,7 @@ def test_a_failing_plan_ends_its_program_with_its_line_and_is_logged(monkeypatch
 
 @pytest.mark.parametrize(("part", "name"), [("motion", "step"), ("programs", "advance"), ("motion", "stop")])
 def test_an_internal_failure_causes_a_protective_stop_that_can_be_unlocked(part, name, monkeypatch):
-    robot, heard = a_robot(), Heard()
+    robot, heard = a_robot(), Kept()
     host, owner = Host(robot.controller, heard, survives=True), getattr(robot.controller, part)
     start(robot, "sleep(1)")
     with monkeypatch.context() as failing:
@@ -346,14 +334,14 @@ class Beside:
 
 
 def begin(seed: int):
-    """Return a robot that runs the hostile program of a seed, and its planner."""
+    """Return a robot that runs the hostile programs of a seed, and its planner."""
     texts, q = text(seed)
     robot = a_robot(q=q)
     beside = Beside(robot)
     for one in texts:
         reply = robot.send(ProgramRun, text=one)
         assert not hasattr(reply, "why"), f"{reply}\n{one}"
-    return robot, beside, texts
+    return robot, beside
 
 
 ODD = (

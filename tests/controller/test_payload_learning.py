@@ -42,23 +42,13 @@ ROBOT = load("ur5e")
 Q1, Q2 = ROBOT.poses["Q1"], ROBOT.poses["Q2"]
 
 
-class Recalling:
-    """Keeps the motions that it studies."""
-
-    def __init__(self):
-        self.motions = []
-
-    def study(self, motion):
-        self.motions.append(motion)
-
-
 class Served:
     """A robot moved by a client, tick by tick."""
 
-    def __init__(self, student=None, shaper="elastic", **changes):
-        setup = free_setup(None, shaper=shaper)
+    def __init__(self, study=None, **changes):
+        setup = free_setup(None, shaper="elastic")
         self.setup = replace(setup, description=setup.description.clean(), **changes)
-        self.host = LoopbackHost(self.setup, learning=student and PayloadLearning(student.study))
+        self.host = LoopbackHost(self.setup, learning=study and PayloadLearning(study))
         self.states, self.events = [], []
         self.host.subscribe("state", lambda data: self.states.append(decode(State, data)))
         self.host.subscribe("event", self.events.append)
@@ -79,10 +69,10 @@ class Served:
 
 
 def test_a_motion_is_recorded_with_its_ring_down():
-    student = Recalling()
-    robot = Served(student)
+    motions = []
+    robot = Served(motions.append)
     robot.move(Q2)
-    (motion,) = student.motions
+    (motion,) = motions
     assert motion.whole
     assert len(motion.q) == len(motion.moments) == motion.stop + AFTER
     assert np.abs(motion.q[0] - Q1).max() < 0.01  # it leads by the sag of its gears
@@ -93,30 +83,29 @@ def test_a_motion_is_recorded_with_its_ring_down():
 
 @pytest.mark.parametrize("what", ["stopped", "soon moved again"])
 def test_interrupted_motions_are_recorded_as_such(what):
-    student = Recalling()
-    robot = Served(student)
+    motions = []
+    robot = Served(motions.append)
     if what == "stopped":
         robot.move(Q2, 0.4)
         robot.ask(Stop(token=robot.token))
         robot.tick(1000)
-        assert not student.motions[0].whole
+        assert not motions[0].whole
         return
     robot.move(Q2, 2.0)
     robot.move(Q1)
-    first, second = student.motions
+    first, second = motions
     assert first.whole
     assert second.whole
     assert len(first.q) <= first.stop + AFTER
     assert len(second.q) == second.stop + AFTER
 
 
-class Failing:
-    def study(self, motion):  # noqa: ARG002
-        raise OSError(28, "No space left on device")
+def failing(_motion):
+    raise OSError(28, "No space left on device")
 
 
 def test_a_failing_study_is_reported_once():
-    robot = Served(Failing())
+    robot = Served(failing)
     for q in (Q2, Q1):
         robot.move(q)
     assert b"".join(robot.events).count(b"No space left on device") == 1
@@ -125,17 +114,13 @@ def test_a_failing_study_is_reported_once():
 MODAL = load_calibration("ur5e_modal")
 
 
-def taken_for(payload):
-    return FilterState("zv", 1, first_source(ROBOT, None), payload, payload)
-
-
 class Following(Served):
     """A robot that learns its payload."""
 
-    def __init__(self, declared, carried, student=None, **changes):
+    def __init__(self, declared, carried, study=None, **changes):
         changes = {"adapt": "payload", "calibration": MODAL} | changes
         super().__init__(
-            student, payload=paper_payload(ROBOT, declared), carried=paper_payload(ROBOT, carried), **changes
+            study, payload=paper_payload(ROBOT, declared), carried=paper_payload(ROBOT, carried), **changes
         )
 
     @property
@@ -148,16 +133,11 @@ class Following(Served):
 
 @pytest.fixture(scope="module")
 def deceived():
-    """A robot that has moved 4 kg, of which 1 kg is declared, and the student of its motion."""
-    student = Recalling()
-    robot = Following(1.0, 4.0, student, adapt=None)
+    """A robot that has moved 4 kg, of which 1 kg is declared, and the record of its motion."""
+    motions = []
+    robot = Following(1.0, 4.0, motions.append, adapt=None)
     robot.move(Q2)
-    return robot, student
-
-
-@pytest.fixture(scope="module")
-def motion(deceived):
-    return deceived[1].motions[0]
+    return robot, motions[0]
 
 
 def test_a_wrong_payload_causes_a_warning_without_learning(deceived):
@@ -225,23 +205,21 @@ def test_an_arm_without_gravity_load_cannot_learn_its_payload():
         free_setup(robot="one-joint", adapt="payload")
 
 
-def odd(motion, what):
+def test_uninformative_motions_teach_nothing(deceived):
+    _, motion = deceived
     ticks = np.arange(len(motion.q))[:, None]
     upright = np.array([0.0, -np.pi / 2, 0.0, -np.pi / 2, 0.0, 0.0])
-    return {
+    odd = {
         "short": {"q": motion.q[:1], "moments": motion.moments[:1]},
         "stopped": {"whole": False},
         "hardly moving": {"q": upright + 1e-6 * motion.q, "moments": 0.0 * motion.moments},
         "NaN": {"moments": np.where(ticks == 200, np.nan, motion.moments)},
         "huge": {"moments": 1e6 * motion.moments},
         "pushed": {"moments": motion.moments + 25.0 * ((ticks >= 150) & (ticks < 300)) * (np.arange(6) < 3)},
-    }[what]
-
-
-@pytest.mark.parametrize("what", ["short", "stopped", "hardly moving", "NaN", "huge", "pushed"])
-def test_uninformative_motions_teach_nothing(motion, what):
+    }
     assert PayloadEstimator(ROBOT).study(motion) is not None
-    assert PayloadEstimator(ROBOT).study(replace(motion, **odd(motion, what))) is None
+    for what, changes in odd.items():
+        assert PayloadEstimator(ROBOT).study(replace(motion, **changes)) is None, what
 
 
 @settings(deadline=None)
@@ -249,15 +227,14 @@ def test_uninformative_motions_teach_nothing(motion, what):
 def test_random_records_never_yield_an_invalid_payload(seed, ticks, size):
     random = np.random.default_rng(seed)
     q, moments = random.standard_normal((ticks, 6)), size * random.standard_normal((ticks, 6))
-    record = MotionRecord(q, moments, min(ticks, 5), True, taken_for(paper_payload(ROBOT, 2.0)))
+    payload = paper_payload(ROBOT, 2.0)
+    state = FilterState("zv", 1, first_source(ROBOT, None), payload, payload)
+    record = MotionRecord(q, moments, min(ticks, 5), True, state)
     if (lesson := PayloadEstimator(ROBOT).study(record)) is not None:
         assert 0.0 <= lesson.payload.mass <= 5.0
         assert abs(lesson.payload.mass - 2.0) > DEAD
         assert max(map(abs, lesson.payload.com)) <= 0.3
         msgspec.json.decode(msgspec.json.encode(lesson.payload), type=type(lesson.payload))
-
-
-LIMITS = MotionLimits(1.5, 2.0, 100.0)
 
 
 def disc(mass):
@@ -290,7 +267,7 @@ class Watched:
             self.worst = max(self.worst, abs(mass) / (TOLERATED + bound))
         return None if said is None else said.why
 
-    def move(self, q, limits=LIMITS):
+    def move(self, q, limits):
         """Return the warnings of a motion; the next one begins at once."""
         self.cycle.begin(self.cycle.plan(q, limits))
         said = []
@@ -299,15 +276,17 @@ class Watched:
         return [warning for warning in said if warning]
 
 
-def limits_of(rng):
-    return MotionLimits(*[(0.5, 1.0, 50.0), (1.5, 2.0, 100.0), (3.0, 8.0, 500.0)][rng.integers(3)])
+PACES = [MotionLimits(0.5, 1.0, 50.0), MotionLimits(1.5, 2.0, 100.0), MotionLimits(3.0, 8.0, 500.0)]
 
 
-def told_and_false(rounds, seed):
-    rng = np.random.default_rng(seed)
+@pytest.mark.parametrize(
+    "rounds", [5, pytest.param(50, marks=[pytest.mark.nightly, pytest.mark.timeout(1200)])]
+)
+def test_a_wrong_payload_causes_a_warning_within_three_moves_a_right_one_never(rounds):
+    rng = np.random.default_rng(1)
     missed, false, worst = 0, 0, 0.0
     for number in range(rounds):
-        poses, limits = random_poses(rng, 4), limits_of(rng)
+        poses, limits = random_poses(rng, 4), PACES[rng.integers(3)]
         description = ROBOT if number % 3 else ROBOT.clean()
         wrong = Watched(poses[0], 2.0, 5.0, description, number)
         told = [wrong.move(q, limits) for q in poses[1:]]
@@ -316,13 +295,5 @@ def told_and_false(rounds, seed):
         right = Watched(poses[0], mass, mass, description, number)
         false += sum(len(right.move(q, limits)) for q in poses[1:])
         worst = max(worst, right.worst)
-    return missed, false, worst
-
-
-@pytest.mark.parametrize(
-    "rounds", [5, pytest.param(50, marks=[pytest.mark.nightly, pytest.mark.timeout(1200)])]
-)
-def test_a_wrong_payload_causes_a_warning_within_three_moves_a_right_one_never(rounds):
-    missed, false, worst = told_and_false(rounds, seed=1)
     assert max(missed, false) <= rounds // 100
     assert rounds > 5 or worst < 0.6  # far from a false alarm

@@ -19,10 +19,6 @@ from .robots import UR5E, Robot
 BITS18 = st.integers(0, 2**18 - 1)
 
 
-def bare():
-    return Peripherals(lambda _: None)
-
-
 def told(peripherals: Peripherals):
     return peripherals.io(1, paper_payload(UR5E), 1.0, {"program": None}, [0.0] * 6)
 
@@ -41,7 +37,7 @@ def test_io_contains_the_external_force(robot):
 
 @given(st.lists(st.tuples(BITS18, BITS18), max_size=8))
 def test_masks_select_the_digital_signals_that_change(steps):
-    peripherals, bits = bare(), [False] * 18
+    peripherals, bits = Peripherals(lambda _: None), [False] * 18
     for mask, values in steps:
         peripherals.set_outputs(SetIo(token="", digital_output_mask=mask, digital_outputs=values))
         peripherals.set_inputs(SimulationSetInputs(token="", digital_input_mask=mask, digital_inputs=values))
@@ -53,7 +49,7 @@ def test_masks_select_the_digital_signals_that_change(steps):
 
 @given(st.integers(0, 3), st.integers(0, 3), st.floats(0, 1), st.floats(0, 1))
 def test_an_analog_output_is_a_fraction_of_its_range(mask, kind, first, second):
-    peripherals, shares = bare(), (first, second)
+    peripherals, shares = Peripherals(lambda _: None), (first, second)
     fields = {f"standard_analog_output_{number}": share for number, share in enumerate(shares)}
     masks = {"standard_analog_output_mask": mask, "standard_analog_output_type": kind}
     peripherals.set_outputs(SetIo(token="", **masks, **fields))
@@ -73,7 +69,7 @@ def test_an_analog_output_is_a_fraction_of_its_range(mask, kind, first, second):
     ),
 )
 def test_bit_registers_are_published_in_words_of_32(bank, writes):
-    peripherals, bits = bare(), [False] * BITS
+    peripherals, bits = Peripherals(lambda _: None), [False] * BITS
     for first, values in writes:
         fitting = values[: BITS - first]
         command = SetRegisters(token="", bank=bank, first=first, values=tuple(fitting))

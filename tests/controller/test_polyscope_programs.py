@@ -147,16 +147,12 @@ def test_powerdown_ends_the_program_and_cuts_power():
     assert robot.states[-1].robot_mode == 3
 
 
-def found(*lines):
-    return [(one.line, one.column, one.level) for one in check_program(script(*lines))]
-
-
 def test_unsimulated_functions_are_warnings_beside_errors():
-    assert found("path_offset_enable()", "sleep(1)", "nope()", "end_freedrive_mode()", "path_offset_enable()") == [
-        (2, 3, "warning"), (4, 3, "error"), (6, 3, "warning"),
-    ]  # fmt: skip
-    (finding, *_) = check_program(script("path_offset_enable()"))
-    assert finding.text == "path_offset_enable: this controller does not simulate path offsets"
+    lines = "path_offset_enable()", "sleep(1)", "nope()", "end_freedrive_mode()", "path_offset_enable()"
+    found = check_program(script(*lines))
+    assert [(one.line, one.level) for one in found] == [(2, "warning"), (4, "error"), (6, "warning")]
+    assert {one.column for one in found} == {3}
+    assert found[0].text == "path_offset_enable: this controller does not simulate path offsets"
 
 
 THREAD = ("thread job():", "x = {}", "sync()", "end", "t = run job()")
@@ -198,10 +194,8 @@ def test_an_early_end_in_column_one_is_a_warning(text, lines):
 
 def test_every_unsimulated_function_causes_a_warning():
     for name in SUBJECTS.keys() - {METHOD}:
-        needed = [one.name for one in known_signatures()[name].parameters][
-            : known_signatures()[name].required
-        ]
-        (finding,) = check_program(script(f"{name}({', '.join('0' for _ in needed)})"))
+        needed = ["0"] * known_signatures()[name].required
+        (finding,) = check_program(script(f"{name}({', '.join(needed)})"))
         assert (finding.line, finding.level) == (2, "warning")
         assert finding.text.startswith(f"{name}: ")
 

@@ -238,17 +238,13 @@ MOVES = (
 )
 
 
-def motions(robot):
-    return robot.kinds().count("motion_started")
-
-
 def test_received_moves_are_one_path_and_sends_between_them_wait_for_the_blends():
     robot, far = opened(*MOVES)
     far.tell("received", ints(1, 1, 1))
     robot.tick(5)
     assert not far.sent
     finish(robot)
-    assert motions(robot) == 1
+    assert robot.kinds().count("motion_started") == 1
     assert far.sent == ints(0, 1, 2)
 
 

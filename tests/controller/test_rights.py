@@ -67,12 +67,9 @@ def test_set_points_need_control():
     assert admit_setpoint(b"\xc1", LEASE) is None
 
 
-def authority(*, realtime=True, instance=""):
-    return Authority(lambda _: None, lambda *_, **__: None, realtime=realtime, instance=instance)
-
-
 def test_a_token_from_before_a_restart_is_invalid():
-    before, after = (authority(instance=instance) for instance in ("1f", "2e"))
+    given = (lambda _: None), (lambda *_, **__: None)
+    before, after = (Authority(*given, realtime=True, instance=instance) for instance in ("1f", "2e"))
     old = before.take("a", 30.0, 0.0).token
     new = after.take("a", 30.0, 0.0).token
     assert (old, new) == ("a#1f.1", "a#2e.1")

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from tvist_controller.foresight.stopper import Stopper
 from tvist_controller.foresight.stops import DECELERATION_RATIO, StopPlanner
 from tvist_controller.kinematics.arm import InverseDynamics
 from tvist_controller.line.differentiator import Target
@@ -12,20 +13,7 @@ from tvist_protocol import commands as c
 from tvist_protocol.replies import Accepted
 from tvist_protocol.simulation import SimulationInject, SimulationReset
 
-from .robots import PAPER, Q1, Q2, Q3, UR5E, H, Robot, stop, without_arm
-
-
-def run(line, ticks):
-    """Return the published targets of some ticks."""
-    samples = [line.step() for _ in range(ticks)]
-    return np.array([[s.target.q, s.target.qd, s.target.qdd] for s in samples])
-
-
-def until_rest(line):
-    out = []
-    while not line.at_rest:
-        out.append(run(line, 1)[0])
-    return np.array(out)
+from .robots import PAPER, Q1, Q2, Q3, UR5E, H, Robot, without_arm
 
 
 def test_a_stop_is_no_later_and_no_further_than_the_move(robot):
@@ -69,11 +57,14 @@ def test_only_a_harder_stop_replaces_a_gentle_one():
     def way(*decelerations):
         line = without_arm()
         line.begin(line.plan(Q2, PAPER))
-        run(line, 450)
-        for deceleration in decelerations:
-            stop(line, deceleration)
-            run(line, 20)
-        return until_rest(line)[-1, 0, 0]
+        stopper = Stopper(line)
+        for deceleration, ticks in zip(decelerations, (450, 20), strict=False):
+            for _ in range(ticks):
+                line.step()
+            stopper.stop(deceleration)
+        while not line.at_rest:
+            line.step()
+        return line.position[0]
 
     assert way(2.0, None) < way(2.0) - 0.1
     assert way(2.0, 1.0) == way(2.0)
@@ -103,16 +94,12 @@ def plan(q, qd, qdd, wanted=None, *, payload=DISC, description=UR5E, clear=lambd
     return planner.by_joints(state, wanted, clear)
 
 
-def moving(seed):
-    random = np.random.default_rng(seed)
-    return random.uniform(-3, 3, 6), random.uniform(-1.5, 1.5, 6), random.uniform(-2, 2, 6)
-
-
 @pytest.mark.parametrize("seed", range(4))
 def test_a_stop_uses_the_hardest_deceleration_within_torque_limits(seed):
     """Each deceleration is checked by itself: a gentler stop may fail where a harder one does."""
-    state = Target(*map(np.array, moving(seed)))
-    stop = plan(*state.__reduce__()[1])
+    random = np.random.default_rng(seed)
+    moving = [random.uniform(-most, most, 6) for most in (3, 1.5, 2)]
+    stop, state = plan(*moving), Target(*moving)
     torque = StopTorque(InverseDynamics(UR5E, DISC), state, np.array(LIMITS.torque))
     planner = StopPlanner(UR5E, InverseDynamics(UR5E, DISC))
     tried = [min(LIMITS.acceleration) * DECELERATION_RATIO**k for k in range(16)]

@@ -91,10 +91,6 @@ class Server:
         self._hold_on()
         return reply
 
-    def put(self, data):
-        """Send what may be a set-point."""
-        self.host.put_setpoint("fuzz", data)
-
     def looks(self):
         """Return everything that a refused command must not change."""
         controller = self.host.controller
@@ -160,7 +156,7 @@ def test_every_message_gets_a_reply_and_refused_ones_change_nothing(server, coun
         for message, setpoint in sequence:
             data = message.packed(server.token)
             if setpoint:
-                server.put(data)
+                server.host.put_setpoint("fuzz", data)
             server.send(data)
 
     run()
@@ -182,7 +178,7 @@ def test_a_flood_of_messages_leaks_no_memory(server):
             server.again()
             for message in sent:
                 data = message.packed(server.token)
-                server.put(data)
+                server.host.put_setpoint("fuzz", data)
                 server.send(data)
         server.again()
         gc.collect()
