@@ -17,7 +17,7 @@ from tvist_plant.model import flexible_model, rigid_model
 from tvist_plant.robot_tables import Payload
 from tvist_plant.stiction import relaxed, stiction_after
 
-from .arms import changed, conservative, energy, hold, quiet, rested, standing
+from .arms import changed, conservative, energy, frames, hold, quiet, rested, standing
 from .reference import commands
 
 IMPERFECT = {
@@ -225,18 +225,11 @@ def test_moment_twists_the_links_by_their_torsional_stiffness(ur5e):
     for numbers in ({"rotor": 1.0}, {"torsion": TORSION}):
         one, command, _ = standing(arm, [0.3, -0.4, 0.0, 0.2, 0.3, 0.0], **numbers)
         before = one.truth().flange_rotation
-        axis = rigid_frames(arm, command.q)[2][:, 0]  # the forearm's x axis, and the upper arm's
+        axis = frames(arm, command.q)[3][:3, 0]  # the forearm's x axis, and the upper arm's
         one.push_body("flange", moment=tuple(20.0 * axis))
         rested(one, command, 600)
         turned.append(pin.log3(one.truth().flange_rotation @ before.T) @ axis)
     assert turned[1] - turned[0] == pytest.approx(2.0 * 20.0 / TORSION, rel=0.02)
-
-
-def rigid_frames(arm, q):
-    model = rigid_model(arm, arm.payload)
-    data = model.createData()
-    pin.forwardKinematics(model, data, q)
-    return [data.oMi[number + 1].rotation for number in range(model.njoints - 1)]
 
 
 def test_twisting_link_rings_at_its_natural_frequency(ur5e):
