@@ -65,6 +65,11 @@ def test_fractional_delay_overshoots_no_more_than_a_cubic_can(values, delay, zet
     assert min(held) - allowed <= out[0] <= max(held) + allowed
 
 
+def test_weights_between_two_ticks_are_those_of_the_cubic_through_the_four_nearest_samples():
+    weights = [read(filled(one), 10.5)[0] for one in np.eye(20)]
+    np.testing.assert_allclose(weights, np.pad([-1.0, 9.0, 9.0, -1.0], (7, 9)) / 16.0, atol=1e-15)
+
+
 @pytest.mark.parametrize("delay", [-1e-9, 17.0000001, 1e300, math.nan, math.inf])
 def test_delay_beyond_the_line_is_refused_without_output(delay):
     line = filled(np.arange(30.0))
