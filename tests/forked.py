@@ -17,11 +17,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 PATIENCE = 600.0
-READ_AT_START = (
-    "NUMBA_",
-    "LD_",
-    "XDG_",
-)  # prefixes of variables that Python or its libraries read when they start
+READ_AT_START = ("NUMBA_", "LD_", "XDG_")
+"""Prefixes of variables that Python or its libraries read when they start."""
 
 
 class Nursery:

@@ -18,15 +18,11 @@ class TouchingArm:
         sensor: Whether the flange has a force sensor, which also measures weight and inertia of the payload.
     """
 
-    def __init__(
-        self, description, payload, *, stiffness=0.0, damping=0.0, sensor=True, parts=PARTS, noise=0
-    ):
-        self._arm = FlexibleArm(description, payload, period=PERIOD / parts, substeps=1)
-        self._parts, self.sensor = parts, sensor
+    def __init__(self, description, payload, *, stiffness=0.0, damping=0.0, sensor=True):
+        self._arm, self.sensor = FlexibleArm(description, payload, period=PERIOD / PARTS, substeps=1), sensor
         self.stiffness, self.damping, self.height = stiffness, damping, -1e9
         self.pushed = np.zeros(3)
         self.force = np.zeros(3)
-        self._noise, self._random = noise, np.random.default_rng(1)
 
     def __getattr__(self, name):
         return getattr(self._arm, name)
@@ -42,10 +38,10 @@ class TouchingArm:
 
     def step(self, command):
         last = self._last
-        for k in range(1, self._parts + 1):
-            share = k / self._parts
+        for k in range(1, PARTS + 1):
+            share = k / PARTS
             z = self._place()
-            rate, self._z = (z - self._z) * self._parts / PERIOD, z
+            rate, self._z = (z - self._z) * PARTS / PERIOD, z
             deep = self.height - z
             push = max(self.stiffness * deep - self.damping * rate, 0.0) if deep > 0.0 else 0.0
             self.force = np.array([0.0, 0.0, push]) + self.pushed
@@ -64,5 +60,4 @@ class TouchingArm:
         rotation, payload = self._arm.truth().flange_rotation, self._arm.payload
         inertial = -payload.mass * measured.accelerometer
         wrench = np.concatenate((inertial + rotation.T @ self.force, np.cross(payload.com, inertial)))
-        wrench[:3] += self._noise * self._random.standard_normal(3)
         return Measurement(measured.q, measured.qd, measured.moment, measured.accelerometer, wrench=wrench)

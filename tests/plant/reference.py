@@ -36,6 +36,12 @@ def commands(description: RobotDescription, start, target, ticks) -> list[DriveC
     ]
 
 
+def between(last: DriveCommand, new: DriveCommand, share: float) -> DriveCommand:
+    return DriveCommand(
+        *(getattr(last, f) + share * (getattr(new, f) - getattr(last, f)) for f in ("q", "qd", "torque"))
+    )
+
+
 def runge_kutta(description: RobotDescription, drive: list[DriveCommand], step: float):
     """Specific force at every tick and the last link angles, started like the plant in static equilibrium."""
     arm = flexible_model(description, description.payload)
@@ -45,15 +51,16 @@ def runge_kutta(description: RobotDescription, drive: list[DriveCommand], step: 
     K_d, K_p, K_i = (np.array(x) for x in (drives.velocity_gain, drives.position_gain, drives.integral_gain))
     F_c, w = np.array(drives.coulomb_friction), drives.friction_width
 
-    def slope(x, q_r, qd_r, torque):
+    def slope(x, command):
         q, theta, v, omega, s = np.split(x, [N, N + n, 2 * N + n, 2 * N + 2 * n])
         gear = K_g * (q[arm.joints] - theta) + D_g * (v[arm.joints] - omega)
         tau = np.zeros(N)
         tau[arm.joints] = -gear
         tau[arm.flexes] = -arm.flex_stiffness * q[arm.flexes] - arm.flex_damping * v[arm.flexes]
-        motor = torque + K_d * (qd_r - omega + (K_p + K_i) * (q_r - theta) + K_p * K_i * s)
+        off = command.q - theta
+        motor = command.torque + K_d * (command.qd - omega + (K_p + K_i) * off + K_p * K_i * s)
         omega_dot = (motor + gear - F_c * (omega / w if drives.linear_friction else np.tanh(omega / w))) / B
-        return np.concatenate([v, omega, pin.aba(model, data, q, v, tau), omega_dot, q_r - theta]), tau
+        return np.concatenate([v, omega, pin.aba(model, data, q, v, tau), omega_dot, off]), tau
 
     first = drive[0]
     q = np.zeros(N)
@@ -67,19 +74,13 @@ def runge_kutta(description: RobotDescription, drive: list[DriveCommand], step: 
     count = round(TICK / step)
     for last, new in itertools.pairwise(drive):
         for k in range(count):
-            a, b, c = (
-                [
-                    getattr(last, f) + (k + p) / count * (getattr(new, f) - getattr(last, f))
-                    for f in ("q", "qd", "torque")
-                ]
-                for p in (0.0, 0.5, 1.0)
-            )
-            k1 = slope(x, *a)[0]
-            k2 = slope(x + step / 2 * k1, *b)[0]
-            k3 = slope(x + step / 2 * k2, *b)[0]
-            k4 = slope(x + step * k3, *c)[0]
+            a, b, c = (between(last, new, (k + p) / count) for p in (0.0, 0.5, 1.0))
+            k1 = slope(x, a)[0]
+            k2 = slope(x + step / 2 * k1, b)[0]
+            k3 = slope(x + step / 2 * k2, b)[0]
+            k4 = slope(x + step * k3, c)[0]
             x = x + step / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-        tau = slope(x, new.q, new.qd, new.torque)[1]
+        tau = slope(x, new)[1]
         q, v = x[:N], x[N + n : 2 * N + n]
         qdd = pin.aba(model, data, q, v, tau)
         pin.forwardKinematics(model, data, q, v, qdd)

@@ -9,7 +9,6 @@ import msgspec
 import numpy as np
 import pinocchio as pin
 import pytest
-from msgspec.structs import asdict
 
 from tvist_plant.description import (
     DISTURBANCES,
@@ -67,7 +66,6 @@ def test_robot_file_by_path_equals_the_robot_by_name(tmp_path, ur5e):
         ("mass    = 5.0", "mass    = -1.0", "payload.mass"),
         ("d     = [0.1625", "d     = [nan", "kinematics.d"),
         ("d     = [0.1625", "d     = [inf", "kinematics.d"),
-        ("d     = [0.1625", "d     = [-inf", "kinematics.d"),
         (MASS, "mass = [3.761, 8.058]", "links.mass"),
         (MASS, MASS.replace("3.761", "0.0"), "links.mass"),
         ("[0.0, -0.02561, 0.00193]", "[0.0, -0.02561]", "links.com"),
@@ -76,15 +74,10 @@ def test_robot_file_by_path_equals_the_robot_by_name(tmp_path, ur5e):
         ("links        = [1, 2]", "links        = [1, 6]", "link_flexibility.links"),
         ("links        = [1, 2]", "links        = [1, 3]", "link_flexibility.links"),
         ("links        = [1, 2]", "links        = [1, 1]", "link_flexibility.links"),
-        ("links        = [1, 2]", "links        = [1, 99]", "link_flexibility.links"),
         ("links        = [1, 2]", "links        = [1]", "link_flexibility.stiffness"),
         ("gear_error_waves     = 202", "gear_error_waves     = 0", "drives.gear_error_waves"),
         ("[0.00018694, 6e-8", "[0.00018694, 6e-2", "links.inertia[5]"),
-        (
-            "inertia = [0.00586, 0.0, 0.0, 0.00586, 0.0, 0.00625]",
-            "inertia = [0.0, 0, 0, 0, 0, 1]",
-            "payload.inertia",
-        ),
+        ("0.00586, 0.0, 0.0, 0.00586, 0.0, 0.00625", "0.0, 0, 0, 0, 0, 1", "payload.inertia"),
         ("Q1 = [0.0, ", "Q1 = [", "poses.Q1"),
         ("[robot]", "[robot", "line 8"),
         ('kinematics = "published', 'kinematic = "published', "provenance.kinematic"),
@@ -101,15 +94,6 @@ def test_invalid_robot_file_is_refused_with_file_and_key(tmp_path, old, new, key
 def test_unknown_robot_lists_the_known_ones():
     with pytest.raises(DescriptionError, match=r"ur6e.*ur5e"):
         load("ur6e")
-
-
-def test_unreadable_robot_file_is_named(tmp_path):
-    with pytest.raises(UserFileError, match="is a directory"):
-        load(tmp_path)
-    file = tmp_path / "binary.toml"
-    file.write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(UserFileError, match=r"binary\.toml"):
-        load(file)
 
 
 @pytest.mark.parametrize(
@@ -196,7 +180,6 @@ def test_fingerprint_ignores_names_limits_and_sensors(description):
         ("stiction_load = -0.01", "stiction_load is -0.01: must be at least 0"),
         ("stiction_speed = 0", "stiction_speed is 0: must be more than 0"),
         ("stiction_stiffness = inf", "stiction_stiffness is inf: must be at most 1e"),
-        ("stictions = [0.5]", "imperfections.stictions is not a key"),
         ("hysteresis = 'a'", "imperfections.hysteresis is text, 'a': must be a number"),
         ("rotor = 0", "rotor is 0: must be more than 0"),
         ("base = {stiff = 1}", "imperfections.base.stiff is not a key"),
@@ -215,14 +198,10 @@ UR = ("ur3e", "ur10e", "ur16e", "ur20", "ur30")
 
 def test_scaling_the_ur5e_to_itself_changes_nothing():
     scale = Scale(UR5E.kinematics, UR5E.limits.torque)
-    assert {
-        key: list(value) if isinstance(value, tuple) else value for key, value in asdict(UR5E.drives).items()
-    } == {key: list(value) if isinstance(value, tuple) else value for key, value in scale.drives().items()}
-    links = scale.link_flexibility(UR5E.kinematics)
-    assert (tuple(links["links"]), tuple(links["stiffness"])) == (
-        UR5E.link_flexibility.links,
-        UR5E.link_flexibility.stiffness,
-    )
+    tables = {"drives": scale.drives(), "link_flexibility": scale.link_flexibility(UR5E.kinematics)}
+    for name, table in tables.items():
+        own = getattr(UR5E, name)
+        assert msgspec.convert(table, type(own)) == own
 
 
 @pytest.mark.parametrize("name", UR)

@@ -17,7 +17,7 @@ from tvist_plant.model import flexible_model, rigid_model
 from tvist_plant.robot_tables import Payload
 from tvist_plant.stiction import relaxed, stiction_after
 
-from .arms import changed, conservative, energy, hold, quiet, rested, standing
+from .arms import changed, conservative, energy, frames, hold, quiet, rested, standing
 from .reference import commands
 
 IMPERFECT = {
@@ -133,19 +133,15 @@ def test_ringing_arm_without_drives_only_loses_energy_to_stiction(pose, mass, sp
         energies.append(energy(plant) + held)
         plant.step(command)
     risen = np.max(energies - np.minimum.accumulate(energies)) / energies[0]
-    measured(
-        "largest rise and what is left, over the energy at the start", (risen, energies[-1] / energies[0])
-    )
+    measured("largest rise and rest of the energy at the start", (risen, energies[-1] / energies[0]))
     assert risen < 5e-5  # of an arm without stiction: up to 6e-4, by the integrator
     assert energies[-1] < 0.3 * energies[0]
 
 
 def test_motor_held_by_stiction_does_not_creep_and_springs_back():
     """The base alone has no drive. It turns as a spring that gives way, and back by what is elastic of that."""
-    gains = {
-        name: (0.0, *getattr(STICKS.drives, name)[1:])
-        for name in ("velocity_gain", "position_gain", "integral_gain")
-    }
+    names = ("velocity_gain", "position_gain", "integral_gain")
+    gains = {name: (0.0, *getattr(STICKS.drives, name)[1:]) for name in names}
     arm = changed(STICKS, "drives", gear_error_amplitude=0.0, **gains)
     plant = FlexibleArm(arm, arm.payload)
     command = DriveCommand(np.array(arm.poses["Q1"]), np.zeros(6), np.zeros(6))
@@ -171,15 +167,11 @@ def test_motor_held_by_stiction_does_not_creep_and_springs_back():
 
 def test_four_substeps_are_enough_for_stiction():
     drive = commands(STICKS, STICKS.poses["Q1"], STICKS.poses["Q3"], 700)
-
     silent = changed(STICKS, "sensors", accelerometer_noise=0.0)
     usual, fine, finer = (felt(silent, drive, None, substeps) for substeps in (None, 16, 64))
     assert FlexibleArm(STICKS, STICKS.payload)._substeps == 4
     assert np.abs(usual - finer).max() < 0.03
     assert np.abs(fine - finer).max() < 0.25 * np.abs(usual - finer).max()
-
-
-PERIODS = (0.002, 0.001, 0.0005)
 
 
 def limp(description, period, gravity):
@@ -213,7 +205,7 @@ def drift(description, period, gravity):
 @pytest.mark.parametrize(("gravity", "limit"), [(True, 5e-4), (False, 1e-5)], ids=["falling", "thrown"])
 def test_energy_is_conserved_and_its_drift_falls_with_the_period(ur5e, gravity, limit, measured):
     """The limit is the share of the kinetic energy reached, at 2 ms."""
-    runs = [drift(ur5e, period, gravity) for period in PERIODS]
+    runs = [drift(ur5e, period, gravity) for period in (0.002, 0.001, 0.0005)]
     measured("energy drift over 1 s at 2, 1 and 0.5 ms [J], kinetic energy [J]", runs)
     changes = [change for change, _ in runs]
     assert changes[0] < limit * runs[0][1]
@@ -233,18 +225,11 @@ def test_moment_twists_the_links_by_their_torsional_stiffness(ur5e):
     for numbers in ({"rotor": 1.0}, {"torsion": TORSION}):
         one, command, _ = standing(arm, [0.3, -0.4, 0.0, 0.2, 0.3, 0.0], **numbers)
         before = one.truth().flange_rotation
-        axis = rigid_frames(arm, command.q)[2][:, 0]  # the forearm's x axis, and the upper arm's
+        axis = frames(arm, command.q)[3][:3, 0]  # the forearm's x axis, and the upper arm's
         one.push_body("flange", moment=tuple(20.0 * axis))
         rested(one, command, 600)
         turned.append(pin.log3(one.truth().flange_rotation @ before.T) @ axis)
     assert turned[1] - turned[0] == pytest.approx(2.0 * 20.0 / TORSION, rel=0.02)
-
-
-def rigid_frames(arm, q):
-    model = rigid_model(arm, arm.payload)
-    data = model.createData()
-    pin.forwardKinematics(model, data, q)
-    return [data.oMi[number + 1].rotation for number in range(model.njoints - 1)]
 
 
 def test_twisting_link_rings_at_its_natural_frequency(ur5e):

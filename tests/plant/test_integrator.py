@@ -7,13 +7,13 @@ import pytest
 
 from tvist_plant import arm_memory, arm_tick, chain, integrator
 from tvist_plant.arm_tick import tick
-from tvist_plant.drives import DriveCommand, springs_and_dampers
+from tvist_plant.drives import springs_and_dampers
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.imperfections import Imperfections, YieldingBase
 from tvist_plant.integrator import cholesky, solve
 
 from .arms import quiet
-from .reference import commands, runge_kutta
+from .reference import between, commands, runge_kutta
 
 ALL = Imperfections(breakaway=1.5, hysteresis=0.3, soft=0.75, base=YieldingBase())
 TICKS = 1400
@@ -35,12 +35,6 @@ def drive(arm):
 @pytest.fixture(scope="module")
 def felt_by_runge_kutta(arm, drive):
     return runge_kutta(arm, drive[:RK], 40e-6)[0]
-
-
-def between(last, new, share):
-    return DriveCommand(
-        *(getattr(last, f) + share * (getattr(new, f) - getattr(last, f)) for f in ("q", "qd", "torque"))
-    )
 
 
 def felt(description, drive, *, period=0.002, substeps=4):

@@ -27,14 +27,6 @@ def placed(flexible, q):
     return data
 
 
-def where(flexible, body):
-    """Joint that a body hangs on, and its placement there."""
-    if body == "flange":
-        frame = flexible.model.frames[flexible.flange]
-        return frame.parentJoint, frame.placement
-    return flexible.model.getJointId(body), pin.SE3.Identity()
-
-
 @pytest.mark.parametrize("joints", [1, 3, 7])
 def test_wrench_on_any_body_matches_pinocchio(joints):
     """Its recursive algorithm takes forces in the frames of the joints, and has no Jacobian in it."""
@@ -47,9 +39,10 @@ def test_wrench_on_any_body_matches_pinocchio(joints):
     for body in outside.bodies:
         outside.clear()
         outside.push_body(body, FORCE, MOMENT, POINT)
-        joint, placement = where(flexible, body)
+        last = flexible.model.frames[flexible.flange] if body == "flange" else None
+        joint = last.parentJoint if last else flexible.model.getJointId(body)
+        lever = last.placement.act(np.array(POINT)) if last else np.array(POINT)
         R = data.oMi[joint].rotation
-        lever = placement.act(np.array(POINT))
         force = R.T @ FORCE
         forces = [pin.Force.Zero() for _ in range(flexible.model.njoints)]
         forces[joint] = pin.Force(force, R.T @ MOMENT + np.cross(lever, force))

@@ -111,13 +111,9 @@ def test_measurements_are_copies(ur5e, drive, kind):
         np.testing.assert_array_equal(old, now)
 
 
-def readings(noise, seed, count=1500):
-    sensor = Accelerometer(noise, seed)
-    return np.array([sensor.read(np.zeros(3)) for _ in range(count)])
-
-
 def test_accelerometer_noise_is_white_with_the_given_rms():
-    noise = readings(0.03, 1, 20000)
+    sensor = Accelerometer(0.03, 1)
+    noise = np.array([sensor.read(np.zeros(3)) for _ in range(20000)])
     np.testing.assert_allclose(np.sqrt(np.mean(noise**2, axis=0)), 0.03, rtol=0.02)
     np.testing.assert_allclose(np.mean(noise, axis=0), 0.0, atol=4 * 0.03 / np.sqrt(20000))
     correlation = np.corrcoef(np.hstack([noise[:-1], noise[1:]]).T) - np.eye(6)

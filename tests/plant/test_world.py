@@ -17,7 +17,15 @@ from tvist_plant.world.mujoco_arm import MujocoArm
 from tvist_plant.world.scene import build
 from tvist_plant.world.scene_file import SceneError, find_scene, scenes
 
-EMPTY = '<mujoco><worldbody><geom size="0.1" pos="3 3 3"/></worldbody></mujoco>'
+from .arms import rested
+
+
+def around(content):
+    """A scene with this in its world."""
+    return f"<mujoco><worldbody>{content}</worldbody></mujoco>"
+
+
+EMPTY = around('<geom size="0.1" pos="3 3 3"/>')
 DOWN = np.array([0.4, -1.8, -1.8, -1.1, 1.57, 0.0])
 """The tool of a UR5e points down."""
 
@@ -49,16 +57,6 @@ def world(tmp_path, text, arm="ur5e", payload=None, **sensors):
 
 def still(q):
     return DriveCommand(np.array(q, dtype=float), np.zeros(len(q)), np.zeros(len(q)))
-
-
-def _fields(measured):
-    return [measured.q, measured.qd, measured.moment, measured.accelerometer, measured.wrench]
-
-
-def held(arm, q, ticks):
-    for _ in range(ticks):
-        measured = arm.step(still(q))
-    return measured
 
 
 def moving(q, ticks):
@@ -119,17 +117,15 @@ def test_contact_stiffness_does_not_depend_on_the_payload(tmp_path, stiffness, l
     arm = world(tmp_path, EMPTY)
     arm.reset(still(DOWN))
     x, y, z = arm.truth().flange_position
-    text = (
-        '<mujoco><worldbody><body name="tool"><geom type="sphere" size="0.01" pos="0 0 0.1"/></body><geom '
-        f'type="box" size="0.2 0.2 0.1" pos="{x} {y} {z - 0.2105}" solref="-{stiffness} -50"/></worldbody></mujoco>'
-    )
-    arm = world(tmp_path, text)
+    tool = '<body name="tool"><geom type="sphere" size="0.01" pos="0 0 0.1"/></body>'
+    box = f'<geom type="box" size="0.2 0.2 0.1" pos="{x} {y} {z - 0.2105}" solref="-{stiffness} -50"/>'
+    arm = world(tmp_path, around(tool + box))
     arm.reset(still(DOWN))
     if loaded is not None:  # at its centre, where that has no moment
         arm.load(Payload(mass=loaded, com=(0.0, 0.0, 0.05)))
-    free = held(arm, DOWN, 1).wrench
+    free = rested(arm, still(DOWN), 1).wrench
     q = DOWN - [0.0, 0.0, 0.006, 0.0, 0.0, 0.0]  # some millimetres down
-    measured = held(arm, q, 800)
+    measured = rested(arm, still(q), 800)
     depth = 0.0005 - (arm.truth().flange_position[2] - z)
     force = arm.contact()
     assert force[2] > 1.0
@@ -149,7 +145,7 @@ def test_tool_has_the_pose_of_the_scene(tmp_path, shape, turned):
     """A capsule across the flange is as wide as it is long, in its own frame and in that of its body."""
     tool = f'<geom type="capsule" size="0.01 0.05" {shape}/>'
     for body in (f'<body name="tool">{tool}</body>', f'<body name="tool"><frame>{tool}</frame></body>'):
-        arm = world(tmp_path, f"<mujoco><worldbody>{body}</worldbody></mujoco>")
+        arm = world(tmp_path, around(body))
         (found,) = arm.things().shapes
         assert found.size[:2] == pytest.approx((0.01, 0.05))
         assert found.pose[:3] == pytest.approx((0.0, 0.0, 0.1))
@@ -163,11 +159,9 @@ def test_tool_has_the_pose_of_the_scene(tmp_path, shape, turned):
     ('contype="4" conaffinity="4"', 'contype="2" conaffinity="2"', False),
 ])  # fmt: skip
 def test_contact_masks_of_the_tool_are_respected(tmp_path, tool, surface, touches):
-    text = (
-        f'<mujoco><worldbody><body name="tool"><geom name="tip" size="0.02" {tool}/></body>'
-        f'<geom name="ground" type="plane" size="1 1 1" pos="0 0 -1" {surface}/></worldbody></mujoco>'
-    )
-    model = world(tmp_path, text)._world.model
+    tip = f'<body name="tool"><geom name="tip" size="0.02" {tool}/></body>'
+    ground = f'<geom name="ground" type="plane" size="1 1 1" pos="0 0 -1" {surface}/>'
+    model = world(tmp_path, around(tip + ground))._world.model
     both = zip(model.pair_geom1, model.pair_geom2, strict=True)
     pairs = {frozenset(model.geom(one).name for one in pair) for pair in both}
     assert (frozenset(("tip", "world/ground")) in pairs) == touches
@@ -180,31 +174,32 @@ def test_obstacle_at_a_reset_is_predicted_without_side_effects(tmp_path, ur5e):
         asked, other = (MujocoArm(ur5e, ur5e.payload, find_scene("table")) for _ in range(2))
         for arm in (asked, other):
             arm.reset(still(clear))
-            held(arm, clear, 5)
+            rested(arm, still(clear), 5)
         assert asked.obstacle(clear, payload) is None
         met = asked.obstacle(low, payload)
         assert met is not None
         assert "stands" in met
         assert "inside" in met
-        after = ([*_fields(arm.step(still(clear))), arm.places()] for arm in (asked, other))
-        for one, two in zip(*after, strict=True):
-            np.testing.assert_array_equal(one, two)
+        after = [arm.step(still(clear)) for arm in (asked, other)]
+        for name in ("q", "qd", "moment", "accelerometer", "wrench"):
+            np.testing.assert_array_equal(*(getattr(measured, name) for measured in after))
+        np.testing.assert_array_equal(asked.places(), other.places())
 
 
 @pytest.mark.parametrize("off", [0.0, 1e-3])
 def test_contact_of_a_pivoted_body_has_the_given_stiffness(tmp_path, off):
     """A beam is turned against a post with a constant force."""
     force, lever, k = 20.0, 0.12, 5e4
-    text = (
-        f'<mujoco><worldbody><body name="beam" pos="2 2 2"><joint name="hinge" pos="{off} 0 0" damping="1"/>'
+    text = around(
+        f'<body name="beam" pos="2 2 2"><joint name="hinge" pos="{off} 0 0" damping="1"/>'
         '<geom type="box" size="0.2 0.01 0.01" mass="2"/></body>'
-        f'<geom size="0.02" pos="{2 + off + lever} 2.03 2" solref="-{k} -100"/></worldbody></mujoco>'
+        f'<geom size="0.02" pos="{2 + off + lever} 2.03 2" solref="-{k} -100"/>'
     )
     arm = world(tmp_path, text)
     arm.reset(still(DOWN))
     model, data = arm._world.model, arm._data
     data.qfrc_applied[model.joint("world/hinge").dofadr[0]] = force * lever
-    held(arm, DOWN, 400)
+    rested(arm, still(DOWN), 400)
     (touch,) = data.contact
     assert -touch.dist == pytest.approx(force / k, rel=0.01)
 
@@ -214,10 +209,9 @@ def test_elastic_impact_has_the_peak_force_v_sqrt_k_m_and_gains_no_energy(tmp_pa
     """The one-joint arm without damping, friction and drives that yield, stretched out, against a wall."""
     k, v, reach, radius = 1e5, 0.2, 0.55, 0.04
     gap = 4e-4 + phase * v * 0.00025
-    text = (
-        f'<mujoco><worldbody><body name="tool"><geom size="{radius}" pos="0 0 0.0125" friction="0 0 0"/></body>'
+    text = around(
+        f'<body name="tool"><geom size="{radius}" pos="0 0 0.0125" friction="0 0 0"/></body>'
         f'<geom type="box" size="0.5 0.1 0.3" pos="0.97 {radius + gap + 0.1} 0.2" friction="0 0 0" solref="-{k} 0"/>'
-        "</worldbody></mujoco>"
     )
     arm = world(tmp_path, text, "one-joint")
     clean = arm._description.clean()
@@ -243,9 +237,7 @@ def test_elastic_impact_has_the_peak_force_v_sqrt_k_m_and_gains_no_energy(tmp_pa
         else:
             before, speed = energy, data.qvel[0] * reach
     expected = speed * np.sqrt(k * inertia[0, 0] / reach**2)
-    measured(
-        "peak over v sqrt(k m), energy gained over the incoming", (peak / expected, after / before - 1.0)
-    )
+    measured("peak over v sqrt(k m), share of energy gained", (peak / expected, after / before - 1.0))
     assert peak == pytest.approx(expected, rel=0.05)
     assert after / before - 1.0 < 1e-3
 
@@ -257,10 +249,8 @@ def test_fingers_hold_a_box_only_with_enough_force(tmp_path):
     truth = arm.truth()
     x, y, z = truth.flange_position + truth.flange_rotation @ hand.position
     turn = np.degrees(np.arctan2(truth.flange_rotation[1, 1], truth.flange_rotation[0, 1]))
-    text = (
-        f'<mujoco><worldbody><body name="box" pos="{x} {y} {z}" euler="0 0 {turn}"><freejoint/><geom type="box" '
-        'size="0.025 0.03 0.03" mass="0.5"/></body></worldbody></mujoco>'
-    )
+    shape = '<freejoint/><geom type="box" size="0.025 0.03 0.03" mass="0.5"/>'
+    text = around(f'<body name="box" pos="{x} {y} {z}" euler="0 0 {turn}">{shape}</body>')
     for force, stays in ((60.0, True), (1.5, False)):
         arm = world(tmp_path, text, payload=Payload(mass=0.9, com=(0.0, 0.0, 0.06)))
         arm.mount(hand)
@@ -274,7 +264,7 @@ def test_fingers_hold_a_box_only_with_enough_force(tmp_path):
         arm.grip(0.0, force)
         box = arm.things().bodies.index("box")
         first = arm.places()[box, :3]
-        held(arm, DOWN, 400)
+        rested(arm, still(DOWN), 400)
         assert (np.linalg.norm(arm.places()[box, :3] - first) < 5e-4) == stays
         if stays:
             assert arm.opening() == pytest.approx(0.05, abs=0.002)
@@ -299,7 +289,7 @@ def test_push_moves_the_arm_and_nan_raises_until_a_reset(tmp_path):
     arm = world(tmp_path, EMPTY)
     rest = arm.reset(still(DOWN)).q
     arm.push(np.array([0.0, 50.0, 0.0, 0.0, 0.0, 0.0]))
-    assert held(arm, DOWN, 50).q[1] > rest[1] + 1e-4
+    assert rested(arm, still(DOWN), 50).q[1] > rest[1] + 1e-4
     arm.make_nan()
     with pytest.raises(PlantError, match="finite"):
         arm.step(still(DOWN))
@@ -312,7 +302,7 @@ def test_scenes_stand_still_and_do_not_touch_the_arm(name, ur5e):
     ursim = [-1.6, -1.727, -2.203, -0.808, 1.595, -0.031]
     arm.reset(still(ursim))
     begun = arm.places()
-    held(arm, ursim, 100)
+    rested(arm, still(ursim), 100)
     loose = [number for number, body in enumerate(arm.things().bodies) if body.startswith("box")]
     np.testing.assert_allclose(arm.places()[loose], begun[loose], rtol=0.0, atol=2e-4)
     assert np.linalg.norm(arm.contact()) == 0.0
@@ -321,6 +311,7 @@ def test_scenes_stand_still_and_do_not_touch_the_arm(name, ur5e):
 BOX = '<body name="{0}" pos="-0.5 0 0.2"><freejoint/><geom type="box" size="{1} {1} {1}" mass="{2}"/></body>'
 HEIGHTS = '<mujoco><asset><hfield name="h" nrow="{0}" ncol="{0}" size="1 1 1 1"/></asset></mujoco>'
 FILES = "<asset>" + "".join(f'<mesh file="{number}.stl"/>' for number in range(20_001)) + "</asset>"
+MANY = "".join(BOX.format(number, 0.1, 1) for number in range(51))
 PEA, EVIL = BOX.format("pea", 0.005, 1e-4), BOX.format("&#x9b;2J" + 9999 * "a", 1, 1)
 
 
@@ -329,23 +320,11 @@ PEA, EVIL = BOX.format("pea", 0.005, 1e-4), BOX.format("&#x9b;2J" + 9999 * "a", 
     [
         ("hello", "scene.xml: it is not valid XML"),
         ("<robot/>", "begins with <robot>: must be a file in MuJoCo's format"),
-        (
-            f'<mujoco><worldbody><geom type="plane" size="1 1 1"/>{PEA}</worldbody></mujoco>',
-            "pea of 0.0001 kg is too light for a contact of .* N/m, .* times the mass",
-        ),
-        (
-            '<mujoco><worldbody><body name="tool"><joint/><geom size="0.1"/></body></worldbody></mujoco>',
-            "shapes only",
-        ),
-        ('<mujoco><worldbody><geom type="box" size="1 1 1"/></worldbody></mujoco>', "stands .* mm inside"),
-        (
-            f"<mujoco><worldbody>{''.join(BOX.format(number, 0.1, 1) for number in range(51))}</worldbody></mujoco>",
-            "51 of its bodies move, too many for real time: must be at most 50",
-        ),
-        (
-            '<mujoco><worldbody><geom size="0.1" solref="-inf nan"/></worldbody></mujoco>',
-            "has a solref that is",
-        ),
+        (around(f'<geom type="plane" size="1 1 1"/>{PEA}'), "pea of 0.0001 kg is too light .* the mass"),
+        (around('<body name="tool"><joint/><geom size="0.1"/></body>'), "shapes only"),
+        (around('<geom type="box" size="1 1 1"/>'), "stands .* mm inside"),
+        (around(MANY), "51 of its bodies move, too many for real time: must be at most 50"),
+        (around('<geom size="0.1" solref="-inf nan"/>'), "has a solref that is"),
         ('<mujoco><include file="pipe"/></mujoco>', "file .*pipe is a pipe, not a file"),
         ('<mujoco><compiler meshdir="/dev"/><asset><mesh file="null"/></asset></mujoco>', "null is a device"),
         ('<mujoco><asset><mesh file="large.stl"/></asset></mujoco>', "more than 256 MiB"),
@@ -370,10 +349,10 @@ def check_refusal(tmp_path, text, said):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("<mujoco><worldbody><geom/></worldbody></mujoco>", "scene.xml: .*size"),
+        (around("<geom/>"), "scene.xml: .*size"),
         (HEIGHTS.format(65536), "MuJoCo ends with exit code -11: a scene may take 30 s and 768 MiB"),
         (HEIGHTS.format(20000), "MuJoCo fails: "),
-        (f"<mujoco><worldbody>{EVIL}{EVIL}</worldbody></mujoco>", "repeated name.*\ufffd2Ja"),
+        (around(EVIL + EVIL), "repeated name.*\ufffd2Ja"),
     ],
     ids=["without a size", "crash", "too large", "long name"],
 )
@@ -384,9 +363,8 @@ def test_scene_that_mujoco_cannot_read_is_refused_in_one_line(tmp_path, text, sa
 @pytest.mark.usefixtures("_apart")
 def test_scene_that_takes_too_long_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(apart, "LONGEST", 1)
-    shapes = 60_000 * '<geom size="0.1" pos="3 3 3"/>'
     with pytest.raises(SceneError, match="exit code -14: a scene may take 1 s"):
-        world(tmp_path, f"<mujoco><worldbody>{shapes}</worldbody></mujoco>")
+        world(tmp_path, around(60_000 * '<geom size="0.1" pos="3 3 3"/>'))
 
 
 def test_missing_scene_lists_those_of_the_package():

@@ -127,19 +127,9 @@ WRONG = [
     (PATH | {"segments": [{"pose": [0.0] * 6}]}, "missing_field", "segments[0].type", "is missing", None),
     (PATH | {"segments": [LINE | {"type": 7}]}, "malformed", "segments[0].type", "a string", None),
     (PATH | {"segments": [LINE, {"type": "joint"}]}, "missing_field", "segments[1].q", "is missing", None),
-    (
-        PATH | {"segments": [LINE | {"pos": 1}]},
-        "unknown_field",
-        "segments[0].pos",
-        "did you mean 'pose'",
-        None,
-    ),
+    (PATH | {"segments": [LINE | {"pos": 1}]}, "unknown_field", "segments[0].pos", "you mean 'pose'", None),
     (PATH | {"segments": [LINE | {"pose": [0] * 5}]}, "out_of_range", "segments[0].pose", "exactly 6", 6),
     (TAKE | {"client": ""}, "out_of_range", "client", "1 to 64 printable", None),
-    (TAKE | {"client": "a" * 65}, "out_of_range", "client", "1 to 64 printable", None),
-    (TAKE | {"client": "a\n"}, "out_of_range", "client", "printable", None),
-    (TAKE | {"client": "a/b"}, "out_of_range", "client", "printable", None),
-    (TAKE | {"client": "**"}, "out_of_range", "client", "printable", None),
     (TAKE | {"client": "@me"}, "out_of_range", "client", "the first not @", None),
     (TAKE | {"lease_s": 0.05}, "out_of_range", "lease_s", "0.1", 0.1),
     (TAKE | {"lease_s": 3601}, "out_of_range", "lease_s", "3600", 3600),
@@ -192,9 +182,7 @@ def test_truncated_messages_and_trailing_bytes_are_malformed():
     assert "trailing" in error.why
 
 
-@pytest.mark.parametrize(
-    "read", [decode_command, partial(decode, Setpoint), decode_reply, partial(decode, State)]
-)
+@pytest.mark.parametrize("read", [decode_command, decode_reply, partial(decode, State)])
 def test_a_message_of_five_megabytes_is_refused_without_decoding(read):
     error = refused(read, b"\xc1" * 5_000_000)
     assert (error.code, error.where, error.limit) == ("malformed", "", MAX_BYTES)
@@ -256,26 +244,23 @@ def test_clients_ignore_unknown_fields_of_received_messages(kind):
     assert read(msgpack.packb(more)) == read(data)
 
 
-LEASE = "t"
-
-
 def test_check_validates_what_the_constructor_accepts():
-    message = MoveJ(token=LEASE, q=(9e9,) * 6)
+    message = MoveJ(token="t", q=(9e9,) * 6)
     error = wrong(lambda: check(message))
     assert (error.code, error.where, error.limit) == ("out_of_range", "q[0]", 1e3)
 
 
 @pytest.mark.parametrize(("message", "code", "where", "said"), [
-    (MoveJ(token=LEASE, q=(0.0, np.float64(1.0))), "malformed", "q[1]", "numpy.float64"),
-    (MoveJ(token=LEASE, q=np.zeros(6)), "malformed", "q", "numpy.ndarray"),
-    (MoveJ(token=LEASE, q=(0.0,), velocity=np.float32(1.0)), "malformed", "velocity", "numpy.float32"),
-    (SimulationReset(token=LEASE, payload=Payload(mass=np.int64(1), com=(0, 0, 0), inertia=(0,) * 6)),
+    (MoveJ(token="t", q=(0.0, np.float64(1.0))), "malformed", "q[1]", "numpy.float64"),
+    (MoveJ(token="t", q=np.zeros(6)), "malformed", "q", "numpy.ndarray"),
+    (MoveJ(token="t", q=(0.0,), velocity=np.float32(1.0)), "malformed", "velocity", "numpy.float32"),
+    (SimulationReset(token="t", payload=Payload(mass=np.int64(1), com=(0, 0, 0), inertia=(0,) * 6)),
      "malformed", "payload.mass", "numpy.int64"),
-    (SimulationStep(token=LEASE, ticks=1, setpoints=(StepSetpoint(sequence=0, q=(np.float64(0),)),)),
+    (SimulationStep(token="t", ticks=1, setpoints=(StepSetpoint(sequence=0, q=(np.float64(0),)),)),
      "malformed", "setpoints[0].q[0]", "numpy.float64"),
     (Done(tick=object()), "malformed", "tick", "object"),
     (MoveJ(token="\ud800", q=(0.0,)), "malformed", "token", "not UTF-8"),
-    *((Setpoint(token=LEASE, sequence=number, q=(0.0,)), "out_of_range", "sequence", "64 bits")
+    *((Setpoint(token="t", sequence=number, q=(0.0,)), "out_of_range", "sequence", "64 bits")
       for number in (2**64, -(2**63) - 1, 10**400)),
 ])  # fmt: skip
 def test_a_message_that_messagepack_cannot_express_is_refused_with_its_field(message, code, where, said):
@@ -286,7 +271,7 @@ def test_a_message_that_messagepack_cannot_express_is_refused_with_its_field(mes
 
 @pytest.mark.parametrize("content", [{"a": float("nan")}, {"a": np.float32(1)}, {1: 2}, {"a": {1, 2}}])
 def test_a_calibration_that_cannot_be_encoded_is_refused_by_the_constructor(content):
-    assert wrong(lambda: SetEstimator(token=LEASE, name="polynomial", calibration=content)).where == (
+    assert wrong(lambda: SetEstimator(token="t", name="polynomial", calibration=content)).where == (
         "calibration" if 1 in content else "calibration.a"
     )
 

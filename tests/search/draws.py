@@ -9,6 +9,7 @@ Random = np.random.Generator
 
 SHAPERS = BUILT_IN.names()  # every shaper that comes with the package
 WITHIN = 1.003  # largest velocity and acceleration of a joint, relative to its limits [-]
+ROUNDING = 1e-9  # differences between positions below this are rounding errors [rad]
 CODES = {"velocity": "limit_velocity", "acceleration": "limit_acceleration", "jerk": "out_of_range"}
 """Limits of a motion, and the codes with which the robot refuses values above its own."""
 

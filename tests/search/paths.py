@@ -9,13 +9,7 @@ from tests.search.spaces import TOOL, UR5E, Leg, errors, random_path, start_post
 from tests.search.stops import KINDS, PAUSES
 from tests.search.subject import Subject, speeds, torques
 
-from tvist_controller.api.line import (
-    TORQUE_SHARE,
-    CollisionModel,
-    body,
-    paper_payload,
-    resting_after,
-)
+from tvist_controller.api.line import TORQUE_SHARE, CollisionModel, body, paper_payload, resting_after
 from tvist_plant.plant import PERIOD
 from tvist_protocol import commands as c
 from tvist_protocol.io import SetTcp

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from tests.search import draws, space
-from tests.search.draws import WITHIN
+from tests.search.draws import ROUNDING, WITHIN
 from tests.search.subject import CLIENT, SESSION, Subject, speeds
 
 from tvist_controller.api.line import CLEARANCE, STILL, CollisionModel, body, paper_payload
@@ -30,17 +30,12 @@ HALTS = frozenset(
     {"stop", "pause", "power_off", "inject", "lose", "release", "program_pause", "program_stop"}
 )
 """Commands after which the reference must not get ahead of the uninterrupted motion."""
-
-
 DIP = 1e-4
 """How much nearer than the clearance two bodies may be [m].
 
 Ways are checked at places up to 4 mm apart, and a curved one may be some 0.03 mm nearer in between. Sequences find such
 places, since they often begin where a motion before was stopped at the clearance.
 """
-
-
-ROUNDING = 1e-9  # differences between positions below this are rounding errors [rad]
 
 
 def far_payload(random, rated):

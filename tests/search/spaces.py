@@ -52,7 +52,6 @@ class Leg:
     end: tuple[np.ndarray, Rotation]
     via: np.ndarray | None = None
     tangent: bool = False
-    q: tuple[np.ndarray, np.ndarray] | None = None
     blend: float = 0.0
 
     def off(self, position, rotation: Rotation) -> tuple[float, float]:
@@ -102,10 +101,10 @@ class Leg:
         return centre, axis, out, angle(p1)
 
 
-def random_path(random, q, count: int | None = None) -> tuple[dict, list[Leg]]:
+def random_path(random, q) -> tuple[dict, list[Leg]]:
     """Segments of a random path from a posture, and their legs."""
     segments, legs, start = [], [], tool_pose(q)
-    for _ in range(int(random.integers(1, 5)) if count is None else count):
+    for _ in range(int(random.integers(1, 5))):
         position = start[0] + random.uniform(-0.15, 0.15, 3)
         rotation = Rotation.from_rotvec(random.uniform(-0.5, 0.5, 3)) * start[1]
         pace = {

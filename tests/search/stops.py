@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from tests.search import draws
-from tests.search.draws import WITHIN
+from tests.search.draws import ROUNDING, WITHIN
 from tests.search.subject import CLIENT, SESSION, Subject, refused, speeds, torques
 
 from tvist_controller.api.line import (
@@ -27,7 +27,6 @@ BARELY, BARELY_WAY = 3e-3, 1e-3
 """A joint that moves no faster than this [rad/s] moves no farther than this when it is stopped [rad]."""
 PAUSES = {"pause", "safeguard"}
 """Kinds of stops that slow down the motion's own time, through the filter."""
-ROUNDING = 1e-9  # differences between positions below this are rounding errors [rad]
 TORQUE_ROUNDING = 1e-3
 """Share by which a torque may exceed its bound between the moments that are checked in planning [-]."""
 Halt = Callable[[Subject, np.random.Generator], object]

@@ -1,31 +1,27 @@
 """Streams of set-points to the floor, to the arm itself and to limits, ended at random."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from tests.search import draws
 from tests.search.draws import WITHIN
-from tests.search.subject import CLIENT, SESSION, Subject, refused, speeds
+from tests.search.stops import KINDS, Halt
+from tests.search.subject import Subject, refused, speeds
 
 from tvist_controller.api.line import CollisionModel, JointLine, body, paper_payload
 from tvist_lab.recordings import Floats
 from tvist_plant.plant import PERIOD
 from tvist_protocol import commands as c
-from tvist_protocol.simulation import SimulationInject
 
 LENGTH = 3.0  # duration of a stream unless something ends it [s]
 
-ENDS: dict[str, Callable[[Subject], object]] = {
-    "silence": lambda _: None,
-    "servo_stop": lambda robot: robot.send(c.ServoStop),
-    "stop": lambda robot: robot.send(c.Stop),
-    "stranger's stop": lambda robot: robot.send(c.Stop, token=None, deceleration=1.0),
-    "token gone": lambda robot: robot.controller.client_gone(CLIENT, SESSION),
-    "power off": lambda robot: robot.send(c.PowerOff),
-    "protective stop": lambda robot: robot.send(SimulationInject, fault="protective_stop"),
-    "emergency stop": lambda robot: robot.send(SimulationInject, fault="emergency_stop"),
-    "safeguard stop": lambda robot: robot.send(SimulationInject, fault="safeguard_stop"),
+ENDS: dict[str, Halt] = {
+    "silence": lambda *_: None,
+    "servo_stop": lambda robot, _: robot.send(c.ServoStop),
+    **{
+        kind: KINDS[kind]
+        for kind in ("plain", "stranger's", "token gone", "power off", "protective", "emergency", "safeguard")
+    },
 }
 """Ways to end a stream."""
 INTERPOLATION = 3 / 42
@@ -104,7 +100,7 @@ def judge(description, case):
     sent: list[Floats] = []
     for tick in range(round(LENGTH / PERIOD)):
         if tick == round(case.ends_at / PERIOD):
-            ENDS[case.end](robot)
+            ENDS[case.end](robot, random)
             if case.end == "silence":
                 break
         if not robot.controller.motion.streaming:

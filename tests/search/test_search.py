@@ -4,7 +4,6 @@ The cases of each test depend on the seed; the arms take turns.
 """
 
 import inspect
-from functools import lru_cache
 from pathlib import Path
 
 import pytest
@@ -15,11 +14,6 @@ from tvist_plant.description import load
 SEVEN = str(Path(__file__).parents[1] / "plant" / "urdf" / "seven.urdf")
 ARMS = ("ur3e", "ur5e", "ur16e", SEVEN, "ur30")
 APART = 1_000_000  # difference between the case numbers of two consecutive seeds
-
-
-@lru_cache
-def loaded(name):
-    return load(name)
 
 
 def _arguments(test):
@@ -38,7 +32,7 @@ def pytest_generate_tests(metafunc):
 
 @pytest.fixture
 def arm(case):
-    return loaded(case[0])
+    return load(case[0])
 
 
 @pytest.fixture

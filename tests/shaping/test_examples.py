@@ -58,12 +58,6 @@ def test_readme_table_matches_the_catalogue():
     assert table == [row(shaper) for shaper in SHAPERS.values()]
 
 
-def first_example():
-    """What the first block of code of the README is, without its prompts."""
-    block = README.read_text().split("```pycon\n")[1].split("```")[0]
-    return "\n".join(line[4:] for line in block.splitlines() if line.startswith((">>> ", "... ")))
-
-
 ALONE = """
 import importlib.abc, sys
 class Refusing(importlib.abc.MetaPathFinder):
@@ -76,16 +70,11 @@ sys.meta_path.insert(0, Refusing())
 
 
 def test_first_readme_example_needs_only_numpy_and_ten_lines(tmp_path):
-    example = first_example()
-    assert len(example.splitlines()) <= 10
-    package = README.parent / "tvist_shaping"
-    path = f"sys.path = [{str(package.parent)!r}, *sys.path]\n"
-    ended = subprocess.run(
-        [sys.executable, "-c", ALONE + path + example],
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=tmp_path,
-    )
+    block = README.read_text().split("```pycon\n")[1].split("```")[0]
+    example = [line[4:] for line in block.splitlines() if line.startswith((">>> ", "... "))]
+    assert len(example) <= 10
+    program = "\n".join([ALONE, f"sys.path = [{str(README.parent)!r}, *sys.path]", *example])
+    command = [sys.executable, "-c", program]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
     assert ended.returncode == 0, ended.stderr
     assert "%" in ended.stdout

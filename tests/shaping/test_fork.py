@@ -10,7 +10,8 @@ from tvist_shaping.estimators.modal import Modal
 from tvist_shaping.fir import FirDesign
 from tvist_shaping.steady import AimedFilter, ProductDesign, ShortDesign, SteadyFilter
 
-H = 0.002
+from .motions import H, shaped_by
+
 JOINTS = 2
 THREE = Drivetrain((9e3, 8e3, 5e4), (0.3, 0.2, 0.0), (150.0, 120.0, 0.0), (15.0, 15.0, 0.0), (1.0, 1.0, 5.0))
 
@@ -75,10 +76,6 @@ def said(tvist):
     return [*tvist.f_d, *tvist.zeta, tvist.delay, tvist.mean_delay, tvist.clipped]
 
 
-def output(tvist, samples):
-    return np.array([tvist.filter(q) for q in samples])
-
-
 def check(make, runs, seen):
     """Fork in the middle of a run: it repeats the original to the bit, and what it is given changes nothing there.
 
@@ -91,11 +88,11 @@ def check(make, runs, seen):
     before, after = whole[: runs[0]], whole[runs[0] :]
     astray = np.random.default_rng(2).uniform(-3.0, 3.0, after.shape)
     never, forked = make(), make()
-    output(never, before)
-    output(forked, before)
+    shaped_by(never, before)
+    shaped_by(forked, before)
     one, other = forked.fork(), forked.fork()
     told = seen(forked)
-    output(other, astray)
+    shaped_by(other, astray)
     assert seen(forked) == told
     for q in after:
         expected = never.filter(q)
@@ -104,7 +101,7 @@ def check(make, runs, seen):
         other.filter(q[::-1])
         assert seen(one) == seen(forked) == seen(never)
     # A fork of a fork, from where that one has gone.
-    np.testing.assert_array_equal(output(one.fork(), astray), output(never, astray))
+    np.testing.assert_array_equal(shaped_by(one.fork(), astray), shaped_by(never, astray))
 
 
 @pytest.mark.parametrize(("row", "kind"), [*enumerate(FILTERS)])
@@ -147,7 +144,7 @@ def test_fork_of_a_fade_repeats_it_bit_for_bit(estimator, ticks):
     for shared in (False, True):
         check(lambda shared=shared: make(shared), (ticks, 200), seen)
         fade = make(shared)
-        output(fade, path(1, ticks))
+        shaped_by(fade, path(1, ticks))
         shares.append(fade.share)
         assert fade.fork().old is not fade.old
     assert {0: 0.0, 1: 0.0, 400: 1.0}.get(ticks, shares[0]) == shares[0]
@@ -206,10 +203,10 @@ def test_aimed_filter_has_the_modes_at_the_end_of_the_path():
 @pytest.mark.parametrize("kind", FILTERS)
 def test_fade_continues_along_the_path(kind):
     old, new, x = on("one mode", "fixed", round_about), FILTERS[kind](ESTIMATORS["polynomial"]), parameter()
-    output(old, x[:150])
+    shaped_by(old, x[:150])
     fade = Fade(old, new, **LIMITS)
     assert new.width == 1
-    shaped = output(fade, [*x[150:], *[x[-1]] * 400])
+    shaped = shaped_by(fade, [*x[150:], *[x[-1]] * 400])
     assert fade.finished
     assert (shaped[-1] == x[-1]).all()
     assert (np.abs(np.diff(shaped[:, 0], 2)) <= LIMITS["acceleration"] * 0.002**2).all()
@@ -218,12 +215,12 @@ def test_fade_continues_along_the_path(kind):
 @pytest.mark.parametrize(("kind", "make"), EVERY)
 def test_reset_to_joint_angles_leaves_nothing_of_the_path(kind, make):
     tvist, fresh = on(kind, make, round_about), FILTERS[kind](ESTIMATORS[make])
-    output(tvist, parameter()[:100])
+    shaped_by(tvist, parameter()[:100])
     q = np.ones(JOINTS)
     tvist.reset(q)
     fresh.reset(q)
     samples = q + parameter()
-    assert (output(tvist, samples) == output(fresh, samples)).all()
+    assert (shaped_by(tvist, samples) == shaped_by(fresh, samples)).all()
     assert said(tvist) == said(fresh)
 
 

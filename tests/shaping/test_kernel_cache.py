@@ -263,9 +263,8 @@ def test_link_pipe_or_damaged_file_is_not_loaded(kernel, change):
     cache, file, mark = kernel
     change(file)
     if change is linked:
-        assert not held(
-            [cache]
-        )  # without a warning, which would fail the test, since no change of its mode would help
+        # Without a warning, which would fail the test, since no change of its mode would help.
+        assert not held([cache])
     load(cache)
     assert not mark.exists()
 

@@ -79,8 +79,9 @@ def test_custom_shaper_keeps_its_range_of_damping():
     mine = custom("mine", [0.5, 0.5], [0.0, 0.5], zeta_max=0.1)
     with pytest.raises(ShaperRangeError, match=r"less than 0\.1"):
         mine.function(10.0, 0.1)
-    with pytest.raises(FilterError, match=r"shaper 'mine' demands"):
+    with pytest.raises(FilterError, match=r"less than 0\.1, as .*'mine' demands; take a") as error:
         TvistFilter(mine, Fixed([10.0], [0.2]), joints=1)
+    assert error.value.field == "zeta_max"
     for f_d in (0.0, math.nan):
         with pytest.raises(ShaperRangeError, match="f_d"):
             custom("mine", [1.0], [0.0], f_d)
@@ -217,9 +218,8 @@ def test_exact_humps_have_height_v_and_zeros_between(name, share, f_d):
 def test_exact_hump_keeps_its_height_near_the_highest_damping(V):
     made = ei_of(1, V, exact=True)
     for part in np.linspace(0.0, 0.999, 41):
-        assert residual(1.0, part * made.zeta_max, made.function(1.0, part * made.zeta_max)) == pytest.approx(
-            V, rel=1e-6
-        )
+        zeta = part * made.zeta_max
+        assert residual(1.0, zeta, made.function(1.0, zeta)) == pytest.approx(V, rel=1e-6)
 
 
 @examples(10)
@@ -257,11 +257,8 @@ def test_ripple_matches_the_closed_forms_of_the_literature(humps, V):
 
 @pytest.mark.parametrize(
     "equations",
-    [
-        lambda x: x**2 + 1.0,  # no root
-        lambda x: 0.0 * x + 1.0,  # no slope
-        lambda x: np.full_like(x, np.nan),
-    ],
+    [lambda x: x**2 + 1.0, lambda x: 0.0 * x + 1.0, lambda x: np.full_like(x, np.nan)],
+    ids=["no root", "no slope", "no number"],
 )
 def test_newton_reports_equations_without_a_solution(equations):
     with pytest.raises(ConvergenceError, match="1 equations"):

@@ -118,16 +118,11 @@ def spoilt(seed):
     if kind == 0:
         return text[: dice.randrange(len(text))]
     if kind == 1:
-        return "".join(
-            chr(dice.choice([dice.randrange(256), dice.randrange(32, 127)]))
-            for _ in range(dice.randrange(200))
-        )
+        count = dice.randrange(200)
+        return "".join(chr(dice.choice([dice.randrange(256), dice.randrange(32, 127)])) for _ in range(count))
     if kind > 5:
-        return re.sub(
-            r"\b\d+\b",
-            lambda found: dice.choice([found[0], found[0], "None", '"a"', "[0]", "-1", "g1"]),
-            text,
-        )
+        others = ["None", '"a"', "[0]", "-1", "g1"]
+        return re.sub(r"\b\d+\b", lambda found: dice.choice([found[0], found[0], *others]), text)
     for _ in range(dice.randrange(1, 4)):
         place = dice.randrange(len(text))
         other = dice.randrange(len(text))

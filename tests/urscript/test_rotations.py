@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 from tests.examples import examples
 
-from tvist_urscript import Pose
+from tvist_urscript import Array, Pose
 from tvist_urscript.poses import (
     interpolate_pose,
     pose_add,
@@ -52,15 +52,12 @@ def test_pose_functions_agree_with_scipy(a, b):
 @given(st.lists(NUMBERS, min_size=3, max_size=3))
 @examples(100)
 def test_roll_pitch_and_yaw_agree_with_scipy(angles):
-    from tvist_urscript import Array
-
     turn = Rotation.from_euler("xyz", angles)
     found = Rotation.from_rotvec(rpy2rotvec(Array(angles)).items)
     assert (found * turn.inv()).magnitude() < 1e-12
     again = Rotation.from_euler("xyz", rotvec2rpy(rpy2rotvec(Array(angles))).items)
-    assert (
-        again * turn.inv()
-    ).magnitude() < 1e-7  # the angles themselves are that sensitive where pitch is π/2
+    # The angles themselves are that sensitive where pitch is π/2.
+    assert (again * turn.inv()).magnitude() < 1e-7
 
 
 @pytest.mark.parametrize(
