@@ -5,20 +5,12 @@ import gc
 import socket
 import struct
 import threading
-from contextlib import ExitStack
 
 import pytest
 import zenoh
 
-from tvist_client import (
-    AnswerTimeoutError,
-    LoopbackTransport,
-    MisuseError,
-    MotionStoppedError,
-    NotConnectedError,
-    Robot,
-    ZenohTransport,
-)
+from tvist_client import LoopbackTransport, MisuseError, NotConnectedError, Robot, ZenohTransport
+from tvist_client.errors import AnswerTimeoutError, MotionStoppedError
 from tvist_client.fleet import Fleet, RobotPlace
 from tvist_client.transports import certificates
 from tvist_client.transports import zenoh as zenoh_transport
@@ -28,7 +20,7 @@ from tvist_protocol.commands import KeepAlive
 from tvist_protocol.replies import Accepted
 from tvist_protocol.stream import Event
 
-from .conftest import NEAR, serve
+from .conftest import NEAR, Served
 
 FAR = (1.0, *NEAR[1:])
 
@@ -173,14 +165,7 @@ async def test_pending_calls_fail_when_the_robot_disconnects(realtime, robot):
         await robot.info()
 
 
-@pytest.fixture
-def serving(endpoint):
-    """Serve at the endpoint again."""
-    with ExitStack() as stack:
-        yield lambda: stack.enter_context(serve("lockstep", endpoint))
-
-
-async def test_a_client_reconnects_to_a_restarted_robot(lockstep, robot, serving, note):
+async def test_a_client_reconnects_to_a_restarted_robot(lockstep, robot, endpoint, note):
     states = robot.states()
     async with robot.control("me"):
         assert await robot.advance(300) == 300
@@ -189,13 +174,14 @@ async def test_a_client_reconnects_to_a_restarted_robot(lockstep, robot, serving
     await asyncio.to_thread(lockstep.close)
     with pytest.raises(NotConnectedError):
         await anext(states)
-    back = await asyncio.to_thread(serving)
+    back = await asyncio.to_thread(Served, "lockstep", endpoint)
     # Zenoh tries again after one second, two, four.
     await robot._transport._alive.wait()
     async with robot.control("me") as arm:
         assert (await arm.move_j(NEAR)).started == 1
     assert (await anext(states)).tick <= 1
     await note(back, "release_control")
+    await asyncio.to_thread(back.close)
 
 
 async def test_a_request_without_an_answer_times_out(realtime, robot):
