@@ -43,7 +43,7 @@ COMMANDS = {
     "half a tick": (lambda arm: arm.robot.advance(0.5), "ticks is 0.5: must be a whole number"),
     "too many ticks": (lambda arm: arm.step(100_001), "ticks is 100001: must be from 1 to 100000"),
     "text for a mass": (lambda _: make_payload("5", Q1[:3], Q1), "mass is '5': must be a number"),
-    "half an inertia": (lambda _: make_payload(5, Q1[:3], Q1[:3]), "inertia has 3 entries: must have exactly 6 "),
+    "half an inertia": (lambda _: make_payload(5, Q1[:3], Q1[:3]), "inertia has 3 entries: must have exactly 6"),
 }  # fmt: skip
 
 

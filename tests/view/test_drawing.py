@@ -18,8 +18,6 @@ from tvist_view.playback import playback
 from tvist_view.stage import page
 from tvist_view.track import Track
 
-from .browser import browser
-
 SEVEN = "tests/plant/urdf/seven.urdf"
 ARMS = ("ur5e", SEVEN, "one-joint")
 """Arms of the page; the first one moves."""
@@ -77,12 +75,6 @@ def test_bodies_of_a_world_are_nan_while_unknown(moved):
     for row in (there.row(state, None), there.row(state, truth)):
         assert len(row) == len(look.row(state, truth)) + 6
         assert np.isnan(row[-6:]).all()
-
-
-@pytest.fixture(scope="module")
-def chromium(moved):  # whose event loop playwright would not suffer beside its own
-    with browser() as started:
-        yield started
 
 
 def undrawn(chromium):

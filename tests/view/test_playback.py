@@ -12,8 +12,6 @@ from tvist_cli.main import main
 from tvist_view.playback import playback, said
 from tvist_view.track import Track, TrackError
 
-from .browser import browser
-
 OLD = Path(__file__).parents[1] / "journals" / "live_lost_lease.mcap"
 
 
@@ -75,12 +73,6 @@ def test_recording_of_an_older_server_is_drawn_by_its_robot_file(tmp_path):
     ended = finished("-m", "tvist_cli", "view", OLD, "--html", tmp_path / "x.html")
     assert ended.returncode == 0, ended.stderr
     assert "drawn stiff" in (tmp_path / "x.html").read_text()
-
-
-@pytest.fixture(scope="module")
-def chromium(tracks):  # and after all tests that run an event loop, which playwright would not suffer
-    with browser() as started:
-        yield started
 
 
 def test_page_in_a_file_plays_and_seeks_without_network(chromium, tracks, tmp_path):
