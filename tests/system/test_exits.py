@@ -139,15 +139,12 @@ def test_signals_end_the_recording_of_a_client_completely(realtime, tmp_path):
     """Impatient people send two."""
     path = tmp_path / "seen.mcap"
     with begun("log", "record", path, "--endpoint", realtime.endpoint) as process:
-        try:
-            assert "recording ur5e into" in process.stderr.readline()
-            with Wire(realtime.endpoint) as wire:
-                wire.until(wire.state()["tick"] + 20)
-            for _ in range(2):
-                process.send_signal(signal.SIGTERM)
-            _, said = process.communicate(timeout=PATIENCE)
-        finally:
-            process.kill()
+        assert "recording ur5e into" in process.stderr.readline()
+        with Wire(realtime.endpoint) as wire:
+            wire.until(wire.state()["tick"] + 20)
+        for _ in range(2):
+            process.send_signal(signal.SIGTERM)
+        _, said = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, said
     assert "states recorded" in said
     assert read(path).complete
