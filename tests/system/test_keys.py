@@ -124,9 +124,7 @@ class TestServing:
             ("tls/127.0.0.1:7447", ("--insecure",), ["security and insecure"]),
         ],
     )
-    def test_endpoints_and_options_that_contradict_security_are_refused(
-        self, ring, called, endpoint, options, words
-    ):
+    def test_what_contradicts_security_is_refused(self, ring, called, endpoint, options, words):
         assert_said(called("serve", "--listen", endpoint, "--security", str(ring), *options), 2, words)
 
     def serve(self, called, ring):

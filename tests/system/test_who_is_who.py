@@ -75,9 +75,7 @@ def test_killed_client_loses_control_at_once_and_its_arm_stops(holder, live):
         assert live.command("keep_alive", token=token) == {"type": "done"}
 
 
-def test_killed_client_without_a_liveliness_token_keeps_control_until_its_lease_expires(
-    realtime, start, live
-):
+def test_killed_client_without_a_liveliness_token_keeps_control_until_its_lease_ends(realtime, start, live):
     live.listen("state", "event")
     process = start(CLIENT, realtime.endpoint, "move", "lease_s=1.0")
     live.next("state", lambda state: state["target_qd"][0] > 0.1)
@@ -112,11 +110,9 @@ def test_copy_that_disconnects_does_not_end_the_lease(holder, realtime, live):
     with Wire(realtime.endpoint) as copy:
         declare = copy.session.liveliness().declare_token
         sessions = (session, copy.session.info.zid())
-        tokens = [declare(f"tvist/ur5e/client/twin/{of}") for of in sessions]
-        assert len(tokens) == 2
+        _tokens = [declare(f"tvist/ur5e/client/twin/{of}") for of in sessions]
         copy.info()
-    later = live.state()["tick"] + AT_ONCE
-    live.until(later)
+    live.until(live.state()["tick"] + AT_ONCE)
     assert not [event for event in live.received["event"] if event["kind"] == "lease_lost"]
     assert live.command("keep_alive", token=token) == {"type": "done"}
     since = live.state()["tick"]
@@ -154,5 +150,4 @@ def test_only_the_server_answers_and_publishes(realtime, live):
     assert robots == ["tvist/ur5e/alive"]
     assert heard == []
     assert told
-    assert FORGED not in told
     assert not [payload for payload in told if b"forged" in payload]

@@ -1,4 +1,4 @@
-"""A robot of another process that tvist moves: it brakes, plays nothing old, and restarts only when that is safe."""
+"""A robot of another process that tvist moves: it brakes, and restarts only when that is safe."""
 
 import contextlib
 import signal
