@@ -1,4 +1,4 @@
-"""Examples with UR's interfaces: a log of a motion like that of the paper's authors, and the use of a shaper."""
+"""Examples of UR's interfaces: a motion is logged like by the paper's authors, and a shaper shortens vibration."""
 
 import csv
 import re

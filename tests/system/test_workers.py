@@ -13,7 +13,8 @@ from tests.system.waiting import eventually
 
 from tvist_client.check import check
 from tvist_lab.recordings.mcap_file import read
-from tvist_lab.replay import replay_file
+
+from .test_ur_lockstep import replayed
 
 LOCKSTEP = ("--robots", "ur5e*3", "--workers", "2", "--clock", "lockstep")
 NAMES = ["ur5e-1", "ur5e-2", "ur5e-3"]
@@ -66,9 +67,7 @@ def test_signal_to_all_processes_ends_them_in_order(tmp_path):
         assert served.end(signal.SIGINT) == 0
         assert psutil.wait_procs(children, PATIENCE)[1] == []
     assert all(f"recorded into {tmp_path / f'out-{name}.mcap'}\n" in served.said for name in NAMES)
-    recording = read(tmp_path / "out-ur5e-3.mcap")
-    assert recording.complete
-    assert replay_file(recording).first_difference is None
+    replayed(tmp_path / "out-ur5e-3.mcap")
 
 
 def test_killed_process_is_reported_with_its_robots_and_ends_the_others(tmp_path):
