@@ -47,8 +47,7 @@ def test_client_loses_control_when_its_link_is_cut_and_reconnects(proxy, bystand
         restored = bystander.until_later()["tick"]
         back = wire.wait("state", lambda state: state["tick"] >= restored)
         measured("from its return to the first state [s of tick time]", (back["tick"] - restored) * TICK)
-        refused = wire.command("keep_alive", token=token)
-        assert (refused["type"], refused["code"]) == ("refused", "no_control")
+        assert wire.command("keep_alive", token=token)["code"] == "no_control"
         with wire.control("far") as token:
             assert wire.command("keep_alive", token=token) == {"type": "done"}
     assert proxy.connections == 2

@@ -17,7 +17,7 @@ from tvist_client.fleet import Fleet, ManyStates, RobotPlace
 from tvist_server.gateways import network
 
 from .keyring import forge, free_tls_endpoint, made
-from .routed import Router, far
+from .routed import Router
 from .shell import begun, tvist
 from .test_wrong_invocations import assert_said
 
@@ -56,8 +56,8 @@ def test_fleet_finds_all_robots_with_their_namespaces(router, robots):
 
 def test_robots_of_one_name_in_two_namespaces_are_separate(router, robots):
     with (
-        far(router.endpoint, "ur5e-1", "") as here,
-        far(router.endpoint, "ur5e-1", "hall-3/line-1") as there,
+        Wire(router.endpoint, "ur5e-1") as here,
+        Wire(router.endpoint, "ur5e-1", {"namespace": "hall-3/line-1"}) as there,
         here.control("anna") as mine,
         there.control("otto") as other,
     ):

@@ -1,4 +1,4 @@
-"""Examples of UR's interfaces: a motion is logged like by the paper's authors, and a shaper shortens vibration."""
+"""Examples with UR's interfaces: a log like that of the paper's authors, and motions with a shaper."""
 
 import csv
 import re

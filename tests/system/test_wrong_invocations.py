@@ -234,10 +234,7 @@ def test_an_invalid_file_is_reported_with_key_value_and_limit(called, tmp_path, 
     assert_said(called("serve", option, name), code, [name, *words])
 
 
-SWEEP = """shapers = ["zv"]
-moves = 2
-payloads = [5]
-"""
+SWEEP = "shapers = ['zv']\nmoves = 2\npayloads = [5]\n"
 SWEEPS = [
     (SWEEP.replace("zv", "zvv"), ["shapers[0]", "'zvv'", "did you mean"]),
     (SWEEP + "robots = ['ur5']", ["robots[0]", "'ur5'", "one-joint, ur10e"]),
