@@ -7,9 +7,9 @@ from pathlib import Path
 import msgpack
 import pytest
 import zenoh
-from tests import forked
 from tests.conformance.served import PATIENCE
 from tests.conformance.wire import Q1, STOPPED, Wire
+from tests.system.shell import Begun
 
 pytestmark = pytest.mark.realtime
 
@@ -35,12 +35,10 @@ def holder(realtime, live):
     """A process in control that moves the arm, its session and its token."""
     live.listen("state", "event", "telemetry")
     command = [sys.executable, "-c", HOLDER, str(ROOT), realtime.endpoint]
-    process = forked.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-    session, token = process.stdout.readline().split()
-    live.next("state", lambda state: state["target_qd"][0] > 0.2)
-    yield process, session, token
-    process.kill()
-    process.communicate(timeout=PATIENCE)
+    with Begun(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        session, token = process.stdout.readline().split()
+        live.next("state", lambda state: state["target_qd"][0] > 0.2)
+        yield process, session, token
     go_home(live)
 
 
