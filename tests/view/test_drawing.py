@@ -22,6 +22,7 @@ SEVEN = "tests/plant/urdf/seven.urdf"
 ARMS = ("ur5e", SEVEN, "one-joint")
 """Arms of the page; the first one moves."""
 UR5E = load("ur5e")
+BODY = Capsule(name="x", link=5, start=(0, 0, 0), end=(0, 0, 1), radius=0.1)
 
 
 def look_of(name):
@@ -42,10 +43,7 @@ def standing(moved, look):
         ({"a": [0.1]}, "1 a, 2 d and 2 alpha"),
         ({"a": [], "d": [], "alpha": []}, "no joints"),
         ({"bending": [2]}, "link 2: must be 0 to 1"),
-        (
-            {"capsules": [Capsule(name="x", link=5, start=(0, 0, 0), end=(0, 0, 1), radius=0.1)]},
-            "link 5: must be -1 to 1",
-        ),
+        ({"capsules": [BODY]}, "link 5: must be -1 to 1"),
     ],
 )
 def test_geometry_that_cannot_be_drawn_is_refused(changes, says):

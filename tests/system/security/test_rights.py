@@ -77,10 +77,7 @@ def test_operator_moves_and_streams_and_receives_everything(operator):
         operator.wait("event", lambda event: event["kind"] == "motion_done" and event["id"] == motion)
         assert operator.state()["target_q"] == pytest.approx(NEAR, abs=1e-6)
         assert operator.wait("truth")["type"] == "truth"
-        operator.command("servo_start", token=token)
-        operator.setpoint(token=token, sequence=0, q=NEAR)
-        operator.next("state", lambda state: state["setpoint_sequence"] == 0)
-        operator.command("servo_stop", token=token)
+    stream_once(operator)
 
 
 class TestViewer:
