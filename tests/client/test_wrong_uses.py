@@ -42,8 +42,8 @@ COMMANDS = {
     "no list of registers": (lambda arm: arm.set_registers("input_int", 1), "values is 1: must be a list"),
     "half a tick": (lambda arm: arm.robot.advance(0.5), "ticks is 0.5: must be a whole number"),
     "too many ticks": (lambda arm: arm.step(100_001), "ticks is 100001: must be from 1 to 100000"),
-    "text for a mass": (lambda _: make_payload("5", Q1[:3], Q1), "mass is '5': must be a number"),
-    "half an inertia": (lambda _: make_payload(5, Q1[:3], Q1[:3]), "inertia has 3 entries: must have exactly 6"),
+    "text for a mass": (lambda _: make_payload("5", 3 * (0,), 6 * (0,)), "mass is '5': must be a number"),
+    "moments": (lambda _: make_payload(5, 3 * (0,), 3 * (0,)), "inertia has 3 entries: must have exactly 6"),
 }  # fmt: skip
 
 

@@ -127,3 +127,9 @@ def test_twin_of_a_recording_can_be_served(day, identified, called, tmp_path):
     with Served("--robot", path, "--clock", "lockstep") as robot:
         assert robot.endpoint
     called("identify", day, "--twin").assert_failed(1, "robot.toml exists already")
+
+
+def test_missing_robot_is_reported(called, tmp_path):
+    code, _, err = called("identify", "ur://127.0.0.1:1", "--yes")
+    assert (code, "no robot answers at ur://127.0.0.1:1" in err) == (1, True), err
+    assert list(tmp_path.iterdir()) == []

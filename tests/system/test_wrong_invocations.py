@@ -189,7 +189,6 @@ def test_misuse_of_studies_prints_one_message_and_exits_with_code_2(called, argu
         (("check", NOWHERE, "--security", "nope"), [NOWHERE, "tls/<host>:<port>"]),
         (("check", "tls/127.0.0.1:7447", "--security", "nope"), ["nope", "tvist keys"]),
         (("identify", NOWHERE), ["no server answers", NOWHERE]),
-        (("identify", "ur://127.0.0.1:1", "--yes"), ["no robot answers at ur://127.0.0.1:1"]),
         (("log", "analyze", "nope.mcap"), ["nope.mcap", "No such file"]),
         (("study", "x.toml"), ["x.toml", "No such file"]),
         (("log", "analyze", "."), [".", "no MCAP file"]),
