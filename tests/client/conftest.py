@@ -3,7 +3,7 @@
 import asyncio
 import queue
 import threading
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, closing, suppress
 from functools import cache
 
 import msgspec
@@ -79,10 +79,6 @@ class Host(LoopbackHost):
         lease = self.controller.session.lease
         return None if lease is None else lease.client
 
-    def receive(self, command):
-        """Carry out a command of nobody's client."""
-        return self.controller.receive(command)
-
 
 class Served:
     """A robot behind a Zenoh gateway, with one thread that owns it."""
@@ -152,15 +148,6 @@ class Served:
             self._ended.wait(0.002)
 
 
-@contextmanager
-def serve(clock, endpoint, *, ready=True):
-    served = Served(clock, endpoint, ready=ready)
-    try:
-        yield served
-    finally:
-        served.close()
-
-
 @pytest.fixture(autouse=True)
 def _no_blocking_calls_on_the_loop(request):
     """A robot in this process computes on the loop, and reads files there; a client of the network does neither."""
@@ -177,20 +164,20 @@ def endpoint():
 
 @pytest.fixture
 def realtime(endpoint):
-    with serve("realtime", endpoint) as served:
+    with closing(Served("realtime", endpoint)) as served:
         yield served
 
 
 @pytest.fixture
 def lockstep(endpoint):
-    with serve("lockstep", endpoint) as served:
+    with closing(Served("lockstep", endpoint)) as served:
         yield served
 
 
 @pytest.fixture
 def starting(endpoint):
     """A robot that is starting until the test says that it is ready."""
-    with serve("lockstep", endpoint, ready=False) as served:
+    with closing(Served("lockstep", endpoint, ready=False)) as served:
         yield served
 
 

@@ -3,13 +3,15 @@
 import asyncio
 import inspect
 import threading
+import traceback
 
 import pytest
 from tools import stubs
 
 import tvist_client
-from tvist_client import LoopbackTransport, MotionStoppedError, NotConnectedError, RefusedError, blocking
+from tvist_client import LoopbackTransport, NotConnectedError, RefusedError, blocking
 from tvist_client.blocking import Robot
+from tvist_client.errors import ClientError, MisuseError, MotionStoppedError
 
 from .conftest import NEAR
 
@@ -75,8 +77,6 @@ def test_blocking_calls_and_blocks_raise_errors(host, robot):
         raise ZeroDivisionError
     assert host.holder is None
     with robot.control("me") as arm:
-        with pytest.raises(RefusedError):
-            arm.move_j([9.0] * 6)
         motion = arm.move_j(NEAR, wait=False)
         assert (motion.stopped, motion.ended) == (None, False)
         robot.advance(5)
@@ -84,6 +84,32 @@ def test_blocking_calls_and_blocks_raise_errors(host, robot):
         with pytest.raises(MotionStoppedError) as raised:
             motion.wait()
         assert motion.stopped == raised.value.event
+
+
+def test_a_traceback_of_the_blocking_client_shows_the_line_of_the_caller(robot):
+    with robot.control("me") as arm:
+        with pytest.raises(RefusedError) as raised:
+            arm.move_j([9.0] * 6)
+        frames = traceback.extract_tb(raised.value.__traceback__)
+        assert frames[0].line == "arm.move_j([9.0] * 6)"
+        assert [frame.name for frame in frames[1:]] == ["__call__", "call"]
+        assert (raised.value.__cause__, raised.value.__suppress_context__) == (None, True)
+
+
+def test_a_blocking_call_in_a_callback_raises_an_error(robot):
+    raised = []
+
+    def on_state(_):
+        try:
+            robot.state()
+        except ClientError as error:
+            raised.append(error)
+
+    robot.on_state(on_state)
+    with robot.control("me"):
+        robot.advance(1)
+    assert isinstance(raised[0], MisuseError)
+    assert "callback" in str(raised[0])
 
 
 async def test_blocking_iterators_end_when_the_connection_closes(host):

@@ -31,9 +31,7 @@ def source():
         for callback in callbacks:
             callback(data)
 
-    return SimpleNamespace(
-        callbacks=callbacks, put=put, subscribe=lambda _, callback: callbacks.append(callback)
-    )
+    return SimpleNamespace(callbacks=callbacks, put=put, subscribe=lambda _, one: callbacks.append(one))
 
 
 @pytest.fixture

@@ -5,17 +5,9 @@ import asyncio
 import numpy as np
 import pytest
 
-from tvist_client import (
-    LoopbackTransport,
-    MisuseError,
-    MotionStoppedError,
-    NotConnectedError,
-    RefusedError,
-    Robot,
-    StreamStoppedError,
-    UnexpectedReplyError,
-)
+from tvist_client import LoopbackTransport, MisuseError, NotConnectedError, RefusedError, Robot
 from tvist_client.connection import CHUNK
+from tvist_client.errors import MotionStoppedError, StreamStoppedError, UnexpectedReplyError
 from tvist_protocol import commands as c
 from tvist_protocol import motions as m
 from tvist_protocol.codec import encode
@@ -135,8 +127,8 @@ async def test_a_refusal_carries_the_reply_and_keeps_control(host, robot):
         assert (raised.value.reply.where, raised.value.reply.limit) == ("q[0]", pytest.approx(2 * np.pi))
         await arm.move_j(NEAR)
         assert await robot.request(c.KeepAlive(token=arm.token)) == Done()
-        host.receive(c.ReleaseControl(token=arm.token))
-        host.receive(c.TakeControl(client="another"))
+        host.controller.receive(c.ReleaseControl(token=arm.token))
+        host.controller.receive(c.TakeControl(client="another"))
         with pytest.raises(RefusedError, match=r"stale_token|no_control"):
             await arm.keep_alive()
     assert host.holder == "another"

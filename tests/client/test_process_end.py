@@ -52,9 +52,8 @@ except KeyboardInterrupt:
 
 @pytest.mark.parametrize("program", [ASYNCHRONOUS, ABANDONED, FAILING])
 def test_a_program_that_does_not_close_its_connection_ends(realtime, endpoint, program):
-    ended = subprocess.run(
-        [sys.executable, "-c", program, endpoint], capture_output=True, text=True, timeout=100, check=False
-    )
+    command = [sys.executable, "-c", program, endpoint]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=100, check=False)
     assert "end of main" in ended.stdout + ended.stderr
     assert "Traceback" not in ended.stderr
 

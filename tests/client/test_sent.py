@@ -9,21 +9,8 @@ import msgspec
 import numpy as np
 import pytest
 
-from tvist_client import (
-    ArcSegment,
-    ArgumentError,
-    Arm,
-    JointSegment,
-    LineSegment,
-    LoopbackTransport,
-    Motion,
-    ProcessSegment,
-    Robot,
-    UnexpectedReplyError,
-    blocking,
-    make_payload,
-)
-from tvist_client.arguments import arguments, built
+from tvist_client import ArgumentError, Arm, LoopbackTransport, Motion, Robot, UnexpectedReplyError, blocking
+from tvist_client.arguments import arguments, built, make_payload
 from tvist_client.command import Sent, begin, guide, move
 from tvist_client.commands import Commands, Questions
 from tvist_protocol import commands as c
@@ -31,6 +18,7 @@ from tvist_protocol import forces as f
 from tvist_protocol import motions as m
 from tvist_protocol.codec import check
 from tvist_protocol.generate import FOLDER
+from tvist_protocol.motions import ArcSegment, JointSegment, LineSegment, ProcessSegment
 from tvist_protocol.replies import Accepted, Done, Posture, ToolPose
 from tvist_protocol.simulation import SimulationReset
 

@@ -23,7 +23,7 @@ async def test_unlock_does_nothing_if_the_robot_is_ready(realtime, endpoint):
 
 async def test_unlock_is_refused_while_another_client_has_control(realtime, endpoint):
     realtime.robot.told = {"robot_mode": 7, "safety_mode": 3}
-    realtime.post(lambda: realtime.robot.receive(c.TakeControl(client="somebody")))
+    realtime.post(lambda: realtime.robot.controller.receive(c.TakeControl(client="somebody")))
     with pytest.raises(RefusedError, match="somebody"):
         await unlocked(endpoint)
 

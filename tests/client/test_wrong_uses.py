@@ -2,26 +2,20 @@
 
 import math
 import re
-import traceback
 
 import pytest
 
 from tvist_client import (
     ArgumentError,
-    ClientError,
     JointSegment,
     LineSegment,
-    MisuseError,
-    NotConnectedError,
-    ProtocolError,
     RefusedError,
     Robot,
-    StreamStoppedError,
     TvistError,
     make_payload,
 )
-from tvist_client.blocking import Robot as BlockingRobot
-from tvist_client.transports.loopback import LoopbackTransport
+from tvist_client.errors import MisuseError, NotConnectedError, StreamStoppedError
+from tvist_protocol.errors import ProtocolError
 
 POSE = (0.4, 0.1, 0.5, 0.0, 3.1, 0.0)
 Q1 = (0.0, -3.1, 0.0, -1.57, 0.0, 0.0)
@@ -48,6 +42,8 @@ COMMANDS = {
     "no list of registers": (lambda arm: arm.set_registers("input_int", 1), "values is 1: must be a list"),
     "half a tick": (lambda arm: arm.robot.advance(0.5), "ticks is 0.5: must be a whole number"),
     "too many ticks": (lambda arm: arm.step(100_001), "ticks is 100001: must be from 1 to 100000"),
+    "text for a mass": (lambda _: make_payload("5", 3 * (0,), 6 * (0,)), "mass is '5': must be a number"),
+    "moments": (lambda _: make_payload(5, 3 * (0,), 3 * (0,)), "inertia has 3 entries: must have exactly 6"),
 }  # fmt: skip
 
 
@@ -101,43 +97,3 @@ async def test_invalid_names_and_endpoints_are_refused_with_the_expected_form(ro
     for endpoint in ("", "localhost", "127.0.0.1:7447", "tcp/x:0", "tcp/x:99999", None):
         with pytest.raises(NotConnectedError, match="tcp/<host>:<port>"):
             await Robot.connect(endpoint)
-
-
-def test_an_invalid_payload_raises_an_argument_error():
-    for mass, inertia, said in (
-        ("5", 6 * (0,), "mass is '5': must be a number"),
-        (5, 3 * (0,), "inertia has 3 entries: must have exactly 6 entries, xx"),
-    ):
-        with pytest.raises(ArgumentError, match=said):
-            make_payload(mass, 3 * (0,), inertia)
-
-
-class TestBlocking:
-    @pytest.fixture
-    def robot(self, host):
-        with BlockingRobot.over(LoopbackTransport(host)) as robot:
-            yield robot
-
-    def test_a_traceback_of_the_blocking_client_shows_the_line_of_the_caller(self, robot):
-        with robot.control("me") as arm:
-            with pytest.raises(RefusedError) as raised:
-                arm.move_j([9.0] * 6)
-            frames = traceback.extract_tb(raised.value.__traceback__)
-            assert frames[0].line == "arm.move_j([9.0] * 6)"
-            assert [frame.name for frame in frames[1:]] == ["__call__", "call"]
-            assert (raised.value.__cause__, raised.value.__suppress_context__) == (None, True)
-
-    def test_a_blocking_call_in_a_callback_raises_an_error(self, robot):
-        raised = []
-
-        def on_state(_):
-            try:
-                robot.state()
-            except ClientError as error:
-                raised.append(error)
-
-        robot.on_state(on_state)
-        with robot.control("me"):
-            robot.advance(1)
-        assert isinstance(raised[0], MisuseError)
-        assert "callback" in str(raised[0])

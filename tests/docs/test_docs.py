@@ -20,6 +20,7 @@ from urllib.parse import urlsplit
 import pytest
 from rich.console import Console
 from tests.acceptance import report
+from tests.conformance.conftest import realtime  # noqa: F401  a fixture
 from tests.conformance.served import Served, finished
 from tests.fences import FENCE
 from tests.places import own_address
@@ -194,13 +195,6 @@ def options(program, *verbs):
 
 
 @pytest.fixture(scope="module")
-def realtime():
-    """A robot in real time."""
-    with Served() as served:
-        yield served
-
-
-@pytest.fixture(scope="module")
 def interfaces():
     """Address of a robot whose UR interfaces are open."""
     pytest.importorskip("rtde_receive")
@@ -223,21 +217,16 @@ def story(tmp_path_factory):
     how[recording] = str(folder / how[recording])
     said = []
     with Served(*how) as served:
+        endpoint = served.endpoint
+        at = {"move": ["--endpoint", endpoint], "check": [endpoint], "watch": [endpoint, "--seconds", "1"]}
         for words in rest:
             if words[0] == "log" and served.process.poll() is None:
                 assert served.end(signal.SIGINT) == 0
-            said.append((words, tell(folder, words, served.endpoint)))
+            said.append((words, run("-m", "tvist_cli", *words, *at.get(words[0], ()), cwd=folder)))
+            if words[0] == "move":  # wait for a second, like a person
+                with Robot.connect(endpoint) as robot:
+                    robot.advance(500)
     return folder, said
-
-
-def tell(folder, words, endpoint):
-    """Run a command of the tutorial; after a motion wait for a second, like a person."""
-    at = {"move": ["--endpoint", endpoint], "check": [endpoint], "watch": [endpoint, "--seconds", "1"]}
-    told = run("-m", "tvist_cli", *words, *at.get(words[0], ()), cwd=folder)
-    if words[0] == "move":
-        with Robot.connect(endpoint) as robot:
-            robot.advance(500)
-    return told
 
 
 @pytest.mark.realtime

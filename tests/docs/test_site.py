@@ -145,10 +145,8 @@ class TestBuilt:
             text = re.sub(r"<[^>]*>", "", (site / "html" / page).read_text(encoding="utf-8"))
             assert example in text
             assert f"Usage: tvist {command}" in text
+            assert command != "serve" or "--keep STR" in text
             assert page.name in (site / "html" / "cli" / "index.html").read_text("utf-8")
-        assert "--keep STR" in re.sub(
-            r"<[^>]*>", "", (site / "html" / "commands" / "serve.html").read_text("utf-8")
-        )
 
     def test_search_index_has_the_pages(self, site):
         text = (site / "html" / "search" / "search_index.js").read_text(encoding="utf-8")

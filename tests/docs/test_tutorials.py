@@ -89,16 +89,11 @@ def test_comparison_of_shapers_has_the_documented_output(tmp_path):
     assert run("-W", "error", "compare.py", cwd=folder) == blocks(COMPARED, "text")[0]
 
 
-def help_of(words):
-    stream = io.StringIO()
-    application(words).help_print(words, console=Console(file=stream, width=80))
-    return stream.getvalue()
-
-
 @pytest.mark.parametrize("command", EXAMPLES)
 def test_help_has_an_example_in_80_columns_and_no_repeated_words(command):
-    words = command.split()
-    told = help_of(words)
+    words, stream = command.split(), io.StringIO()
+    application(words).help_print(words, console=Console(file=stream, width=80))
+    told = stream.getvalue()
     assert f"Example: {EXAMPLES[command]}"[:80] in told
     assert EXAMPLES[command].split()[: len(words) + 1] == ["tvist", *words]
     assert max(map(len, told.splitlines())) <= 80

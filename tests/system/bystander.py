@@ -18,11 +18,10 @@ class Bystander(Wire):
         """Wait for a number of ticks; return the state after them."""
         return self.until(self.received["state"][-1]["tick"] + ticks)
 
-    def event(self, kind, **options):
-        """Return the first event of a kind since the connection."""
-        return self.wait(
-            "event", lambda event: event["kind"] == kind and event["tick"] > self.since, **options
-        )
+    def event(self, kind, after=0):
+        """Return the first event of a kind since the connection, or after a later tick."""
+        after = max(after, self.since)
+        return self.wait("event", lambda event: event["kind"] == kind and event["tick"] > after)
 
     def assert_undisturbed(self, ticks=100):
         """States came in order, are finite and continue to come; a query is answered.

@@ -4,17 +4,16 @@ import gc
 import signal
 import subprocess
 import sys
+from contextlib import ExitStack
 
 import pytest
-from tests import forked
 from tests.conformance.conftest import live, lockstep, realtime  # noqa: F401  fixtures
-from tests.conformance.served import PATIENCE
 from tests.conformance.wire import Wire
 
 from tvist_cli import main
 
 from .bystander import Bystander
-from .shell import Ended
+from .shell import Begun, Ended
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -38,19 +37,15 @@ def bystander(realtime):  # noqa: F811  the fixture
 @pytest.fixture
 def start():
     """Return a function that starts a client process and waits until it reports that it is under way."""
-    processes = []
+    with ExitStack() as processes:
 
-    def start(*arguments):
-        process = forked.Popen([sys.executable, *map(str, arguments)], stdout=subprocess.PIPE)
-        processes.append(process)
-        assert process.stdout.readline() == b"under way\n"
-        return process
+        def start(*arguments):
+            command = [sys.executable, *map(str, arguments)]
+            process = processes.enter_context(Begun(command, stdout=subprocess.PIPE))
+            assert process.stdout.readline() == b"under way\n"
+            return process
 
-    yield start
-    for process in processes:
-        process.kill()
-        process.wait(PATIENCE)
-        process.stdout.close()
+        yield start
 
 
 @pytest.fixture

@@ -56,11 +56,7 @@ def install(*packages):
 
 
 class Engine:
-    """Podman, which leaves nothing in the storage and the networks of the machine.
-
-    Args:
-        folder: Storage of images, containers and networks.
-    """
+    """Podman with images, containers and networks in a folder of its own, not in those of the machine."""
 
     def __init__(self, folder):
         missing = [package for program, package in TOOLS.items() if shutil.which(program) is None]
@@ -100,7 +96,7 @@ class Engine:
     def base(self, name):
         """Make a base image from packages of the distribution."""
         archive = self.folder / "base.tar"
-        result = self.run("mmdebstrap", *BASE[:-1], BASE[-1], archive, timeout=BUILD_TIME, check=False)
+        result = self.run("mmdebstrap", *BASE, archive, timeout=BUILD_TIME, check=False)
         if result.returncode != 0:
             not_tested(f"mmdebstrap cannot make a base image: {said(result)}")
         self("import", archive, name, timeout=BUILD_TIME)
@@ -129,10 +125,7 @@ class Engine:
 class Contained(Served):
     """A robot in a container with a read-only file system, without capabilities, on a bridge network.
 
-    Args:
-        engine: Podman.
-        options: Of `podman run`.
-        command: Command and arguments; empty: those of the image.
+    `options` are those of `podman run`; without a `command`, that of the image is run.
     """
 
     def __init__(self, engine, *options, command=()):

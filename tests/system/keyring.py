@@ -1,13 +1,12 @@
 """Keys made by `tvist keys`, and invalid certificates."""
 
-import os
 from datetime import UTC, datetime, timedelta
-from pathlib import Path
 
 from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
-from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
+from cryptography.x509.oid import ExtendedKeyUsageOID as Usage
+from cryptography.x509.oid import NameOID
 from tests.places import free_endpoint
 from tests.system.shell import tvist
 
@@ -25,13 +24,6 @@ def made(folder, *options):
     return folder
 
 
-def leave_out(folder, name):
-    """Revoke the rights of a name."""
-    path = folder / "clients.toml"
-    lines = path.read_text().splitlines(keepends=True)
-    path.write_text("".join(line for line in lines if f'"{name}"' not in line))
-
-
 def shown(folder, authority=None, certificate=None, key=None):
     """Return settings of a Zenoh session with a client's certificate; each file can be replaced."""
     return {
@@ -42,19 +34,11 @@ def shown(folder, authority=None, certificate=None, key=None):
     }
 
 
-def forge(
-    folder: Path, name, *, issuer=None, key=None, days=1.0, usage=ExtendedKeyUsageOID.CLIENT_AUTH, chain=False
-):
-    """Make a folder with a client's certificate; return the folder.
+def forge(folder, name, *, issuer=None, key=None, days=1.0, usage=Usage.CLIENT_AUTH, chain=False):
+    """Make a folder with a certificate of a client's common name, and return the folder.
 
-    Args:
-        folder: The new folder.
-        name: Common name.
-        issuer: Files of the signing certificate and key; None: self-signed.
-        key: File of its key; None: a new one.
-        days: Time until it expires [days].
-        usage: Extended key usage.
-        chain: Whether to append the issuer's certificate.
+    `issuer` has the files of certificate and key that sign it, else it signs itself; `key` is the file of its
+    own key, else it is new; `chain` appends the issuer's certificate.
     """
     folder.mkdir()
     own = read_key(key) if key else ec.generate_private_key(ec.SECP256R1())
@@ -86,7 +70,3 @@ def forge(
 
 def read_key(path):
     return serialization.load_pem_private_key(path.read_bytes(), password=None)
-
-
-def mode(path):
-    return os.stat(path).st_mode & 0o777  # noqa: PTH116  Path.stat reads no better

@@ -13,12 +13,7 @@ ROOM = 1 << 14  # bytes that the link holds each way; few, so that a stopped lin
 
 
 class Relay:
-    """Passes bytes on between its own address and a server's, both ways and in order.
-
-    Args:
-        target: The server's endpoint, `tcp/<host>:<port>`.
-        near: IP address and port where it listens; None for a free port of 127.0.0.1.
-    """
+    """Passes bytes on between its own address, `near`, and a server's endpoint, both ways and in order."""
 
     def __init__(self, target, near=None):
         host, port = target.partition("/")[2].split(":")

@@ -1,7 +1,6 @@
-"""A router in a process, and clients behind it."""
+"""A router in a process."""
 
 from tests.conformance.served import Served
-from tests.conformance.wire import Wire
 
 
 class Router(Served):
@@ -11,8 +10,3 @@ class Router(Served):
 
     def __init__(self, *options, endpoint=None, around=()):
         super().__init__(*options, name=None, endpoint=endpoint, around=around)
-
-
-def far(endpoint, robot, namespace):
-    """Return a client of a robot in a namespace."""
-    return Wire(endpoint, robot, {"namespace": namespace} if namespace else ())

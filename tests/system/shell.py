@@ -47,7 +47,13 @@ def tvist(*arguments, **options):
     return python("-m", "tvist_cli", *arguments, **options)
 
 
+class Begun(forked.Popen):
+    def __exit__(self, *error):
+        self.kill()
+        super().__exit__(*error)
+
+
 def begun(*arguments, **options):
-    """Start the program, and return its process."""
+    """Start the program, and return its process; a `with` kills it at its end."""
     words = [sys.executable, "-m", "tvist_cli", *map(str, arguments)]
-    return forked.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)
+    return Begun(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options)

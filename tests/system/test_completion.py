@@ -26,10 +26,7 @@ CASES = {
     "tvist serve --robot ur5": {"ur5-light", "ur5e", "ur5e_stiction"},
 }
 """Typed lines with what completes their last word."""
-ASKED = {
-    "tvist move Q": {"Q1", "Q2", "Q3"},
-    "tvist study moves --shapers zvd": {"zvd", "zvdd", "zvddd"},
-}
+ASKED = {"tvist move Q": {"Q1", "Q2", "Q3"}, "tvist study moves --shapers zvd": {"zvd", "zvdd", "zvddd"}}
 """The same for values that the shell asks the program for."""
 OF_EACH_KIND = ("tvist log an", "tvist serve --no-f", "tvist run wav", "tvist serve --robot ur5")
 VALUES = [
@@ -83,10 +80,8 @@ def shown(shell, folder, *words):
     if shutil.which(shell) is None:
         pytest.skip(f"there is no {shell}")
     script(shell, folder)
-    ended = subprocess.run(
-        [shell, *words], capture_output=True, text=True, check=True, cwd=folder, timeout=300, env=PATHS
-    )
-    return ended.stdout
+    how = {"text": True, "cwd": folder, "timeout": 300, "env": PATHS}
+    return subprocess.run([shell, *words], capture_output=True, check=True, **how).stdout
 
 
 def offered_by_bash(folder, cases):
@@ -115,9 +110,7 @@ def test_fish_completes_the_last_word(typed, folder):
 
 
 @pytest.mark.parametrize(("annotation", "typed", "wanted"), VALUES)
-def test_completion_offers_the_valid_values_of_each_kind_of_option(
-    annotation, typed, wanted, folder, monkeypatch
-):
+def test_completion_offers_the_values_of_each_kind_of_option(annotation, typed, wanted, folder, monkeypatch):
     monkeypatch.chdir(folder)
     names = annotation.completer(SimpleNamespace(incomplete=typed))
     assert {name for name in names if name.startswith(typed)} == wanted

@@ -52,18 +52,12 @@ def swing(t):
     return [angle + offset for angle in NEAR]
 
 
-async def in_lockstep():
+async def test_lockstep_over_the_network_and_in_process_give_bit_equal_states():
     with Served("--clock", "lockstep", "--truth") as served:
         async with await Robot.connect(served.endpoint) as robot:
-            return await script(robot)
-
-
-async def in_process():
+            one = await script(robot)
     async with robot_in_process(free_setup()) as robot:
-        return await script(robot)
-
-
-def assert_equal(one, other):
+        other = await script(robot)
     assert [state.tick for state in one.states] == [state.tick for state in other.states]
     for before, after in zip(one.states, other.states, strict=True):
         if before != after:  # equality of floats: to the last bit, but for the sign of zero
@@ -73,11 +67,6 @@ def assert_equal(one, other):
     assert msgspec.json.encode(one.states) == msgspec.json.encode(other.states)
     assert one.events == other.events
     assert one.truths == other.truths
-
-
-async def test_lockstep_over_the_network_and_in_process_give_bit_equal_states():
-    one, other = await in_lockstep(), await in_process()
-    assert_equal(one, other)
     ticks = [state.tick for state in one.states]
     assert ticks == list(range(ticks[0], ticks[-1] + 1))
     assert {event.kind for event in one.events} == {

@@ -7,10 +7,9 @@ import subprocess
 import sys
 
 import pytest
-from tests import forked
 from tests.conformance.served import NOISE, PATIENCE, Served, finished, free_endpoint
 from tests.conformance.wire import Wire
-from tests.system.shell import begun
+from tests.system.shell import Begun, begun
 
 from tvist_lab.recordings.mcap_file import read
 from tvist_server.shutdown import ending_signals
@@ -109,17 +108,13 @@ main()
 def test_end_of_the_terminal_ends_the_server_with_a_complete_recording(tmp_path):
     path, (ours, its) = tmp_path / "run.mcap", os.openpty()
     command = [sys.executable, "-c", TERMINAL, "--listen", free_endpoint(), "--record", path]
-    process = forked.Popen(command, stdin=its, stdout=its, stderr=its, start_new_session=True)
-    os.close(its)
-    said = b""
-    try:
+    with Begun(command, stdin=its, stdout=its, stderr=its, start_new_session=True) as process:
+        os.close(its)
+        said = b""
         while b"Press Control+C to stop" not in said:
             said += os.read(ours, 4096)
         os.close(ours)
         assert process.wait(PATIENCE) == 0
-    finally:
-        process.kill()
-        process.wait(PATIENCE)
     assert read(path).complete
 
 
@@ -139,15 +134,12 @@ def test_signals_end_the_recording_of_a_client_completely(realtime, tmp_path):
     """Impatient people send two."""
     path = tmp_path / "seen.mcap"
     with begun("log", "record", path, "--endpoint", realtime.endpoint) as process:
-        try:
-            assert "recording ur5e into" in process.stderr.readline()
-            with Wire(realtime.endpoint) as wire:
-                wire.until(wire.state()["tick"] + 20)
-            for _ in range(2):
-                process.send_signal(signal.SIGTERM)
-            _, said = process.communicate(timeout=PATIENCE)
-        finally:
-            process.kill()
+        assert "recording ur5e into" in process.stderr.readline()
+        with Wire(realtime.endpoint) as wire:
+            wire.until(wire.state()["tick"] + 20)
+        for _ in range(2):
+            process.send_signal(signal.SIGTERM)
+        _, said = process.communicate(timeout=PATIENCE)
     assert process.returncode == 0, said
     assert "states recorded" in said
     assert read(path).complete

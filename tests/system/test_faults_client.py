@@ -48,9 +48,7 @@ def test_resumed_client_cannot_continue_its_stream(realtime, bystander, start):
     before = bystander.next("telemetry", lambda telemetry: telemetry["tick"] > stopped["tick"])
     assert bystander.info()["control"] == "dying"  # its lease continues
     frozen.send_signal(signal.SIGCONT)
-    bystander.next(
-        "telemetry", lambda telemetry: telemetry["setpoints_refused"] > before["setpoints_refused"] + 20
-    )
+    bystander.next("telemetry", lambda told: told["setpoints_refused"] > before["setpoints_refused"] + 20)
     assert bystander.until_later()["target_q"] == rest["target_q"]
     bystander.assert_undisturbed()
     frozen.kill()

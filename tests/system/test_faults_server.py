@@ -71,14 +71,6 @@ def test_client_of_a_killed_server_raises_and_reconnects_to_the_next_one():
                 arm.move_j([0.01, *Q1[1:]])
 
 
-class Running(Served):
-    """A Python program that serves a robot."""
-
-    def __init__(self, program, *options):
-        self.program = ("-c", program)
-        super().__init__(*options)
-
-
 BUSY_LOOP = """
 import asyncio, sys, time
 from tvist_server.server import Server
@@ -104,12 +96,17 @@ sys.argv = ["tvist", "serve", *sys.argv[1:]]
 from tvist_cli.main import main
 main()
 """
-"""A server whose event loop is blocked again and again, for 25 ticks, by a loop that holds the interpreter's lock."""
+
+
+class Blocked(Served):
+    """Its event loop is blocked again and again, for 25 ticks, by a loop that holds the interpreter's lock."""
+
+    program = ("-c", BUSY_LOOP)
 
 
 def test_ticks_continue_while_the_event_loop_is_blocked():
     """The loop blocks until ticks pass, so if ticks waited for it, neither would continue."""
-    with Running(BUSY_LOOP) as served, Bystander(served.endpoint) as bystander:
+    with Blocked() as served, Bystander(served.endpoint) as bystander:
         for _ in range(2):  # the loop does its own work, too
             bystander.next("telemetry")
         bystander.assert_undisturbed()

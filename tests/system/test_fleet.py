@@ -17,7 +17,7 @@ from tvist_client.fleet import Fleet, ManyStates, RobotPlace
 from tvist_server.gateways import network
 
 from .keyring import forge, free_tls_endpoint, made
-from .routed import Router, far
+from .routed import Router
 from .shell import begun, tvist
 from .test_wrong_invocations import assert_said
 
@@ -56,8 +56,8 @@ def test_fleet_finds_all_robots_with_their_namespaces(router, robots):
 
 def test_robots_of_one_name_in_two_namespaces_are_separate(router, robots):
     with (
-        far(router.endpoint, "ur5e-1", "") as here,
-        far(router.endpoint, "ur5e-1", "hall-3/line-1") as there,
+        Wire(router.endpoint, "ur5e-1") as here,
+        Wire(router.endpoint, "ur5e-1", {"namespace": "hall-3/line-1"}) as there,
         here.control("anna") as mine,
         there.control("otto") as other,
     ):
@@ -84,11 +84,8 @@ def test_stop_reaches_all_robots_and_reports_a_missing_one(router, robots):
 
 def test_watch_shows_all_robots_or_the_states_of_one(router, robots):
     def first_line(*options):
-        process = begun("watch", router.endpoint, *options, "--json")
-        line = process.stdout.readline()
-        process.kill()
-        process.communicate(timeout=PATIENCE)
-        return json.loads(line)
+        with begun("watch", router.endpoint, *options, "--json") as process:
+            return json.loads(process.stdout.readline())
 
     assert [RobotPlace(one["namespace"], one["name"]) for one in first_line()["robots"]] == ALL
     assert first_line("--namespace", "hall-3")["type"] == "state"
@@ -105,9 +102,7 @@ def test_states_of_many_robots_come_by_one_key(router, robots):
 
 
 def test_robots_run_on_and_are_found_again_after_a_router_was_killed():
-    router = Router()
-    router.wait_until_ready()
-    with Served(*LOCKSTEP, "--robots", "ur5e*2", name=None, router=router.endpoint):
+    with Router() as router, Served(*LOCKSTEP, "--robots", "ur5e*2", name=None, router=router.endpoint):
         router.process.send_signal(signal.SIGKILL)
         router.wait()
         with Router(endpoint=router.endpoint) as again:
@@ -120,7 +115,6 @@ def test_robots_run_on_and_are_found_again_after_a_router_was_killed():
 
             found = asyncio.run(asyncio.wait_for(back(), PATIENCE))
             assert [robot.safety_mode for robot in found] == ["NORMAL", "NORMAL"]
-    router.kill()
 
 
 def test_router_reduces_the_rate_of_states_of_each_listed_robot_but_not_of_events():
@@ -134,13 +128,9 @@ def test_router_reduces_the_rate_of_states_of_each_listed_robot_but_not_of_event
     ):
         take = Callback(lambda sample: came.put(str(sample.key_expr)), indirect=False)
         client.session.declare_subscriber("tvist/*/*", take)
-        publishers = [
-            robot.session.declare_publisher(
-                f"tvist/{name}/{leaf}", congestion_control=zenoh.CongestionControl.BLOCK
-            )
-            for name in names
-            for leaf in ("state", "event")
-        ]
+        keys = [f"tvist/{name}/{leaf}" for name in names for leaf in ("state", "event")]
+        block, declare = zenoh.CongestionControl.BLOCK, robot.session.declare_publisher
+        publishers = [declare(key, congestion_control=block) for key in keys]
         while not all(publisher.matching_status.matching for publisher in publishers):
             pass
         while not all(3 <= got[f"tvist/{name}/state"] < rounds for name in names) and rounds < MOST_ROUNDS:

@@ -17,7 +17,7 @@ from tests.conformance.wire import PATIENCE
 
 from tvist_client.__main__ import main as check_alone
 
-from .keyring import forge, free_tls_endpoint, made, mode
+from .keyring import forge, free_tls_endpoint, made
 from .shell import begun, tvist
 from .test_wrong_invocations import assert_said
 
@@ -40,8 +40,8 @@ class TestMaking:
         names = {str(path.relative_to(ring)) for path in content(ring)}
         assert names == {"authority.pem", "authority.key", "robot.pem", "robot.key", "clients.toml"} | clients
         assert (ring / "anna" / "authority.pem").read_bytes() == (ring / "authority.pem").read_bytes()
-        assert {mode(key) for key in ring.rglob("*.key")} == {0o600}
-        assert {mode(ring / who) for who in ("anna", "wall")} == {0o700}
+        assert {key.stat().st_mode & 0o777 for key in ring.rglob("*.key")} == {0o600}
+        assert {(ring / who).stat().st_mode & 0o777 for who in ("anna", "wall")} == {0o700}
 
     def test_certificates_have_their_usage_and_validity(self, tmp_path):
         ring = made(tmp_path / "ring", "--operator", "anna", "--days", "30")
@@ -59,9 +59,8 @@ class TestMaking:
 
     def test_second_call_adds_clients_and_overwrites_nothing(self, ring, called):
         before = content(ring)
-        code, out, err = called("keys", str(ring), "--operator", "anna", "--viewer", "otto", "--json")
-        assert code == 0, err
-        assert json.loads(out)["roles"] == {"anna": "operator", "wall": "viewer", "otto": "viewer"}
+        said = called("keys", ring, "--operator", "anna", "--viewer", "otto", "--json").assert_done().json
+        assert said["roles"] == {"anna": "operator", "wall": "viewer", "otto": "viewer"}
         after = content(ring)
         assert {path for path in before if before[path] != after[path]} == {ring / "clients.toml"}
         assert (ring / "otto" / "authority.pem").read_bytes() == (ring / "authority.pem").read_bytes()
@@ -124,9 +123,7 @@ class TestServing:
             ("tls/127.0.0.1:7447", ("--insecure",), ["security and insecure"]),
         ],
     )
-    def test_endpoints_and_options_that_contradict_security_are_refused(
-        self, ring, called, endpoint, options, words
-    ):
+    def test_what_contradicts_security_is_refused(self, ring, called, endpoint, options, words):
         assert_said(called("serve", "--listen", endpoint, "--security", str(ring), *options), 2, words)
 
     def serve(self, called, ring):
@@ -147,12 +144,10 @@ class TestServing:
         usage = ExtendedKeyUsageOID.SERVER_AUTH
         expired = forge(tmp_path / "expired", "ur5e", issuer=issuer, days=-1, usage=usage)
         other = made(tmp_path / "other", "--operator", "anna")
-        for what in ("pem", "key"):
-            (ring / f"robot.{what}").write_bytes((expired / f"client.{what}").read_bytes())
-        assert_said(self.serve(called, ring), 2, ["expired"])
-        for what in ("pem", "key"):
-            (ring / f"robot.{what}").write_bytes((other / f"robot.{what}").read_bytes())
-        assert_said(self.serve(called, ring), 2, ["no client would trust"])
+        for files, said in ((expired / "client", "expired"), (other / "robot", "no client would trust")):
+            for what in (".pem", ".key"):
+                (ring / f"robot{what}").write_bytes(files.with_suffix(what).read_bytes())
+            assert_said(self.serve(called, ring), 2, [said])
 
     def test_port_in_use_is_reported_without_internal_settings(self, ring, called):
         with socket.create_server(("127.0.0.1", 0)) as taken:
@@ -191,17 +186,9 @@ class TestProgram:
         wall = ("--security", ring / "wall")
         with begun("watch", endpoint, *wall, "--json") as watching:
             assert json.loads(watching.stdout.readline())["type"] == "state"
-            watching.kill()
         file = tmp_path / "seen.mcap"
         tvist("log", "record", file, "--endpoint", endpoint, *wall, "--seconds", "0.1").assert_done()
         assert file.stat().st_size > 1000
-
-    def test_endpoint_without_matching_keys_is_refused(self, robot, tmp_path):
-        endpoint, ring = robot
-        tvist("check", endpoint).assert_failed(1, endpoint, "give its folder")
-        plain = endpoint.replace("tls/", "tcp/")
-        tvist("check", plain, "--security", ring / "anna").assert_failed(1, plain, "tls/<host>:<port>")
-        tvist("check", endpoint, "--security", tmp_path).assert_failed(1, str(tmp_path), "tvist keys")
 
 
 def test_commands_of_the_how_to_work_in_their_order(tmp_path):

@@ -93,19 +93,16 @@ def test_signal_ends_all_processes_of_a_study(number, to, temporary, tmp_path):
 
 def test_workers_end_in_order_when_the_main_process_is_killed(temporary, tmp_path):
     names = ("ur5e-1", "ur5e-2")
-    served = Served(*WORKERS, "--record", str(tmp_path / "run.mcap"), name=None)
-    try:
-        served.wait_until_ready()
+    with Served(*WORKERS, "--record", str(tmp_path / "run.mcap"), name=None) as served:
         for name in names:
             with Wire(served.endpoint, name) as wire, wire.control() as token:
                 wire.step(token, 5)
         workers = psutil.Process(served.process.pid).children()
         served.process.kill()
         assert psutil.wait_procs(workers, PATIENCE)[1] == []
+        served.wait()
         assert list(temporary.iterdir()) == []
         assert all(read(tmp_path / f"run-{name}.mcap").complete for name in names)
-    finally:
-        served.kill()
 
 
 def test_starting_workers_end_when_the_main_process_is_killed(temporary):
@@ -123,17 +120,14 @@ def test_next_start_removes_the_folders_of_killed_processes_only(temporary, monk
     monkeypatch.setattr(tempfile, "tempdir", str(temporary))
     held = OwnFolder()
     try:
-        served = Served(*WORKERS, name=None)
-        try:
-            served.wait_until_ready()
+        with Served(*WORKERS, name=None) as served:
             everyone = [psutil.Process(served.process.pid), *psutil.Process(served.process.pid).children()]
             for one in everyone:
                 one.suspend()
             for one in everyone:
                 one.kill()
             assert psutil.wait_procs(everyone, PATIENCE)[1] == []
-        finally:
-            served.kill()
+            served.wait()
         (left,) = set(temporary.iterdir()) - {held.path}
         (temporary / "tvist-own-linked").symlink_to(Path.home())
         with Served(*WORKERS, name=None):

@@ -16,18 +16,14 @@ NEAR = "0.1,-3.1,0.1,-1.5,0.1,0.1"
 def recorded(lockstep, tmp_path_factory):
     """A recording that `tvist log record` made of a motion, and what it said; in lockstep no state is lost."""
     path = tmp_path_factory.mktemp("recorded") / "seen.mcap"
-    process = begun("log", "record", path, "--endpoint", lockstep.endpoint, "--json")
-    try:
+    with begun("log", "record", path, "--endpoint", lockstep.endpoint, "--json") as process:
         assert "recording ur5e into" in process.stderr.readline()
         assert tvist("move", NEAR, "--endpoint", lockstep.endpoint).code == 0
         with Wire(lockstep.endpoint) as wire, wire.control() as token:
             wire.step(token, 400)  # what rings after the motion
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=PATIENCE)
-        return path, Ended(process.returncode, out, err)
-    finally:
-        process.kill()
-        process.communicate(timeout=PATIENCE)
+    return path, Ended(process.returncode, out, err)
 
 
 def test_control_c_ends_an_open_ended_recording_with_exit_code_0(recorded):
@@ -38,9 +34,7 @@ def test_control_c_ends_an_open_ended_recording_with_exit_code_0(recorded):
 
 
 @pytest.mark.realtime
-def test_control_c_before_the_requested_time_keeps_the_recording_and_exits_with_130(
-    realtime, called, tmp_path
-):
+def test_control_c_before_the_time_is_over_keeps_the_recording_and_exits_with_130(realtime, called, tmp_path):
     path = tmp_path / "short.mcap"
     process = begun("log", "record", path, "--endpoint", realtime.endpoint, "--seconds", 600)
     assert "recording" in process.stderr.readline()

@@ -1,4 +1,4 @@
-"""The example that logs a motion through UR's real-time interface, like the authors of the paper."""
+"""Examples with UR's interfaces: a log like that of the paper's authors, and motions with a shaper."""
 
 import csv
 import re
@@ -10,14 +10,15 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from tests.conformance.served import PATIENCE, Served
+from tests.conformance.served import PATIENCE, Served, finished
 from tests.places import own_address
 from tests.system.waiting import eventually
 
 from tvist_client.blocking import Robot
 from tvist_lab.recordings.mcap_file import read
 
-EXAMPLE = Path(__file__).parents[2] / "clients/examples/02_realtime_log.py"
+EXAMPLES = Path(__file__).parents[2] / "clients" / "examples"
+EXAMPLE = EXAMPLES / "02_realtime_log.py"
 TICK, BOOTED = 0.002, 40.0
 COLUMNS = {
     "q_target": "unshaped_q",
@@ -66,11 +67,7 @@ def both(tmp_path_factory):
     folder, host = tmp_path_factory.mktemp("logged"), own_address(1)
     log, recorded = folder / "realtime.csv", folder / "run.mcap"
     options = ("--clock", "lockstep", "--profile", "real", "--ur-address", host, "--record", str(recorded))
-    with (
-        Served(*options) as served,
-        Robot.connect(served.endpoint) as robot,
-        robot.control("mover") as arm,
-    ):
+    with Served(*options) as served, Robot.connect(served.endpoint) as robot, robot.control("mover") as arm:
         robot.advance(1)  # the state before the first tick is not recorded
         command = [sys.executable, EXAMPLE, host, log]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as logger:
@@ -110,3 +107,16 @@ def test_unreachable_robot_is_reported_in_one_line():
     assert ended.returncode == 1
     assert ended.stderr.count("\n") == 1
     assert "127.0.0.250:30003" in ended.stderr
+
+
+@pytest.mark.realtime
+@pytest.mark.nightly
+def test_tool_vibrates_for_a_shorter_time_with_a_shaper(tmp_path):
+    """The figure is in docs/how-to/connect-ur-clients.md."""
+    pytest.importorskip("rtde_control")
+    figure = tmp_path / "figure.png"
+    ended = finished(EXAMPLES / "03_ur_rtde_shaping.py", figure)
+    assert ended.returncode == 0, ended.stderr
+    unshaped, shaped = (int(until) for until in re.findall(r"until (-?\d+) ms", ended.stdout))
+    assert shaped < unshaped - 40
+    assert figure.stat().st_size > 0

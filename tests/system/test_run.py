@@ -52,14 +52,10 @@ def _scripts(tmp_path):
 def waiting(tmp_path):
     """A real-time process whose program waits for a register, and a client of its robot."""
     endpoint = free_endpoint()
-    process = begun("run", "waits.script", "--listen", endpoint, cwd=tmp_path)
-    try:
+    with begun("run", "waits.script", "--listen", endpoint, cwd=tmp_path) as process:
         assert process.stdout.readline() == "ready\n", process.stderr.read()
         with Wire(endpoint) as wire:
             yield process, wire
-    finally:
-        process.kill()
-        process.communicate(timeout=PATIENCE)
 
 
 def test_program_is_read_from_a_pipe(tmp_path):
@@ -215,9 +211,8 @@ class TestInRealTime:
             assert replace(one, missed_ticks=0) == other
         # In real time the server also reports the load of the machine.
         ours = [event for event in live.events if "the control loop is" not in (event.why or "")]
-        assert [(event.tick, event.kind, event.why) for event in ours] == [
-            (event.tick, event.kind, event.why) for event in steps.events
-        ]
+        told, wanted = ([(one.tick, one.kind, one.why) for one in of] for of in (ours, steps.events))
+        assert told == wanted
 
     def test_clients_write_registers_and_receive_the_end_of_the_program(self, waiting):
         process, wire = waiting
@@ -235,17 +230,13 @@ class TestInRealTime:
         (tmp_path / "ur.toml").write_text(f"ur_address = '{address}'\n", encoding="utf-8")
         (tmp_path / "waits.script").write_text(WAITS.replace("(24)", "(20)"), encoding="utf-8")
         how = ("--ur", "--config", "ur.toml", "--listen", free_endpoint())
-        process = begun("run", "waits.script", *how, cwd=tmp_path)
-        try:
+        with begun("run", "waits.script", *how, cwd=tmp_path) as process:
             assert process.stdout.readline() == "ready\n"
             while "listens on" not in process.stderr.readline():
                 assert process.poll() is None
             with Client("rtde_io", "RTDEIOInterface", address) as client:
                 assert client.setInputIntRegister(20, 9)
                 out, err = process.communicate(timeout=PATIENCE)
-        finally:
-            process.kill()
-            process.communicate(timeout=PATIENCE)
         assert (process.returncode, out) == (0, "got 9\n"), err
 
     def test_run_fails_when_a_client_stops_its_program(self, waiting):

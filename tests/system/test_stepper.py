@@ -6,25 +6,11 @@ from tests.conformance.served import Served
 from tests.conformance.wire import Wire
 
 from tvist_client.robot import Robot
-from tvist_lab.recordings.mcap_file import read
-from tvist_lab.replay import replay_file
+
+from .test_ur_lockstep import replayed
 
 FAR = [1.5, -3.0, 0.2, -1.5, 0.1, 0.3]
 LONG = 100_000
-
-
-def answer(replies):
-    (reply,) = replies
-    return msgpack.unpackb(reply.ok.payload.to_bytes())
-
-
-def commands(path):
-    """Return tick and type of each command of a recording, and the recording, which must replay equally."""
-    content = read(path)
-    assert content.complete
-    assert replay_file(content).first_difference is None
-    told = [(entry.tick, entry.message["type"]) for entry in content.journal if entry.kind == "command"]
-    return told, content
 
 
 def test_stop_of_another_client_and_a_signal_take_effect_within_a_long_step(tmp_path):
@@ -45,7 +31,8 @@ def test_stop_of_another_client_and_a_signal_take_effect_within_a_long_step(tmp_
         assert mover.info()["stepper"] == "stepper"
         assert replies.try_recv() is None
         assert served.end() == 0
-    told, content = commands(path)
+    content = replayed(path)
+    told = [(entry.tick, entry.message["type"]) for entry in content.journal if entry.kind == "command"]
     assert [kind for _, kind in told] == ["take_clock", "take_control", "move_j", "simulation.step", "stop"]
     assert 1 < told[-1][0] <= stopped["tick"] <= content.states[-1].tick < LONG
 
@@ -58,7 +45,8 @@ def test_a_running_step_ends_when_another_client_takes_the_clock(lockstep):
         replies = mover.begin("simulation.step", token=token, ticks=LONG)
         mover.until(before + 10)
         clock = stepper.take("clock", "stepper")
-        ended = answer(replies)
+        (reply,) = replies
+        ended = msgpack.unpackb(reply.ok.payload.to_bytes())
         assert ended["type"] == "done"
         assert before + 10 <= ended["tick"] < before + LONG
         assert stepper.info()["tick"] == ended["tick"]

@@ -149,16 +149,12 @@ def test_outputs_registers_and_slider_are_set(alone):
         Client("rtde_io", "RTDEIOInterface", host) as setter,
         Client("rtde_receive", "RTDEReceiveInterface", host) as seen,
     ):
-        calls = (
-            ("setStandardDigitalOut", 0, 8),
-            ("setConfigurableDigitalOut", 8, 8),
-            ("setToolDigitalOut", 16, 2),
-        )
-        for call, first, count in calls:
+        for kind, first, count in (("Standard", 0, 8), ("Configurable", 8, 8), ("Tool", 16, 2)):
+            switch = getattr(setter, f"set{kind}DigitalOut")
             for number in range(count):
-                assert getattr(setter, call)(number, True)
+                assert switch(number, True)
                 eventually(lambda bit=first + number: seen.getDigitalOutState(bit))
-            assert getattr(setter, call)(0, False)
+            assert switch(0, False)
             eventually(lambda bit=first: not seen.getDigitalOutState(bit))
         assert setter.setSpeedSlider(0.5)
         assert setter.setAnalogOutputVoltage(0, 0.4)
@@ -174,10 +170,8 @@ def test_outputs_registers_and_slider_are_set(alone):
         assert io["actual_digital_output_bits"] == 0x2FEFE
         assert io["standard_analog_output"] == [4.0, 0.008]
         assert io["target_speed_fraction"] == 0.5
-        with (
-            pytest.raises(AssertionError, match="already in use"),
-            Client("rtde_io", "RTDEIOInterface", host),
-        ):
+        second = Client("rtde_io", "RTDEIOInterface", host)
+        with pytest.raises(AssertionError, match="already in use"), second:
             pass
         assert setter.setSpeedSlider(1.0)
         eventually(lambda: seen.getTargetSpeedFraction() == 1.0)

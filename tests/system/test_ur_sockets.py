@@ -43,10 +43,8 @@ def test_arm_stops_within_its_limits_after_each_fault_of_the_client(faults, tmp_
     content = replayed(path)
     assert sum(entry.change == "opened" for entry in content.journal) == len(faults)
     for state in content.states:
-        assert all(abs(q) <= 1.0001 * most for q, most in zip(state.target_qd, LIMITS.velocity, strict=True))
-        assert all(
-            abs(q) <= 1.0001 * most for q, most in zip(state.target_qdd, LIMITS.acceleration, strict=True)
-        )
+        for moved, limits in ((state.target_qd, LIMITS.velocity), (state.target_qdd, LIMITS.acceleration)):
+            assert all(abs(q) <= 1.0001 * most for q, most in zip(moved, limits, strict=True))
     ends = [event.tick for event in content.events if event.kind == "program_stopped"]
     begins = [event.tick for event in content.events if event.kind == "program_started"]
     speeds = {state.tick: max(map(abs, state.target_qd)) for state in content.states}

@@ -7,9 +7,9 @@ from pathlib import Path
 import msgpack
 import pytest
 import zenoh
-from tests import forked
 from tests.conformance.served import PATIENCE
 from tests.conformance.wire import Q1, STOPPED, Wire
+from tests.system.shell import Begun
 
 pytestmark = pytest.mark.realtime
 
@@ -35,12 +35,10 @@ def holder(realtime, live):
     """A process in control that moves the arm, its session and its token."""
     live.listen("state", "event", "telemetry")
     command = [sys.executable, "-c", HOLDER, str(ROOT), realtime.endpoint]
-    process = forked.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-    session, token = process.stdout.readline().split()
-    live.next("state", lambda state: state["target_qd"][0] > 0.2)
-    yield process, session, token
-    process.kill()
-    process.communicate(timeout=PATIENCE)
+    with Begun(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        session, token = process.stdout.readline().split()
+        live.next("state", lambda state: state["target_qd"][0] > 0.2)
+        yield process, session, token
     go_home(live)
 
 
@@ -75,15 +73,12 @@ def test_killed_client_loses_control_at_once_and_its_arm_stops(holder, live):
         assert live.command("keep_alive", token=token) == {"type": "done"}
 
 
-def test_killed_client_without_a_liveliness_token_keeps_control_until_its_lease_expires(
-    realtime, start, live
-):
+def test_killed_client_without_a_liveliness_token_keeps_control_until_its_lease_ends(realtime, start, live):
     live.listen("state", "event")
     process = start(CLIENT, realtime.endpoint, "move", "lease_s=1.0")
     live.next("state", lambda state: state["target_qd"][0] > 0.1)
     process.kill()
-    refused = live.command("take_control", client="heir")
-    assert (refused["type"], refused["code"]) == ("refused", "no_control")
+    assert live.command("take_control", client="heir")["code"] == "no_control"
     lost = live.wait("event", lambda event: event["kind"] == "lease_lost")
     stopped = live.wait("event", lambda event: event["kind"] == "motion_stopped")
     assert stopped["tick"] == lost["tick"]
@@ -97,8 +92,7 @@ def test_copied_name_and_token_do_not_keep_a_lease_alive(holder, copy, live, mea
     _alive = copy.session.liveliness().declare_token(f"tvist/ur5e/client/twin{of[copied]}")
     assert copy.command("keep_alive", token=token) == {"type": "done"}
     if copied != "the holder's session":
-        refused = copy.command("take_control", client="twin")
-        assert (refused["type"], refused["code"]) == ("refused", "no_control")
+        assert copy.command("take_control", client="twin")["code"] == "no_control"
     since = live.state()["tick"]
     process.kill()
     ticks = lost(live, since)
@@ -112,11 +106,9 @@ def test_copy_that_disconnects_does_not_end_the_lease(holder, realtime, live):
     with Wire(realtime.endpoint) as copy:
         declare = copy.session.liveliness().declare_token
         sessions = (session, copy.session.info.zid())
-        tokens = [declare(f"tvist/ur5e/client/twin/{of}") for of in sessions]
-        assert len(tokens) == 2
+        _tokens = [declare(f"tvist/ur5e/client/twin/{of}") for of in sessions]
         copy.info()
-    later = live.state()["tick"] + AT_ONCE
-    live.until(later)
+    live.until(live.state()["tick"] + AT_ONCE)
     assert not [event for event in live.received["event"] if event["kind"] == "lease_lost"]
     assert live.command("keep_alive", token=token) == {"type": "done"}
     since = live.state()["tick"]
@@ -154,5 +146,4 @@ def test_only_the_server_answers_and_publishes(realtime, live):
     assert robots == ["tvist/ur5e/alive"]
     assert heard == []
     assert told
-    assert FORGED not in told
     assert not [payload for payload in told if b"forged" in payload]

@@ -13,15 +13,16 @@ from tests.system.waiting import eventually
 
 from tvist_client.check import check
 from tvist_lab.recordings.mcap_file import read
-from tvist_lab.replay import replay_file
+
+from .test_ur_lockstep import replayed
 
 LOCKSTEP = ("--robots", "ur5e*3", "--workers", "2", "--clock", "lockstep")
 NAMES = ["ur5e-1", "ur5e-2", "ur5e-3"]
 
 
-def workers(served):
-    """Return the processes with robots; clients connect to another one, which starts first."""
-    return sorted(psutil.Process(served.process.pid).children(), key=lambda child: child.pid)[1:]
+def processes(served):
+    """Return the process that clients connect to, which starts first, and those with robots."""
+    return sorted(psutil.Process(served.process.pid).children(), key=lambda child: child.pid)
 
 
 def states(endpoint, name, ticks=200):
@@ -46,7 +47,7 @@ def test_robots_of_all_processes_are_found_at_one_endpoint(served):
     ready = [line for line in served.lines if "listens" in line]
     assert len(ready) == 1
     assert f"{', '.join(NAMES)}; shaper zv) listens on {served.endpoint} in 2 processes" in ready[0]
-    assert len(workers(served)) == 2
+    assert len(processes(served)) == 1 + 2
 
 
 def test_states_equal_those_of_a_single_process(served):
@@ -60,48 +61,33 @@ def test_states_equal_those_of_a_single_process(served):
 def test_signal_to_all_processes_ends_them_in_order(tmp_path):
     with Served(*LOCKSTEP, "--record", str(tmp_path / "out.mcap"), name=None) as served:
         states(served.endpoint, "ur5e-3")
-        children = workers(served)
+        _, *children = processes(served)
         for child in children:  # like a terminal or a supervisor
             child.send_signal(signal.SIGINT)
         assert served.end(signal.SIGINT) == 0
         assert psutil.wait_procs(children, PATIENCE)[1] == []
-        served.assert_quiet()
     assert all(f"recorded into {tmp_path / f'out-{name}.mcap'}\n" in served.said for name in NAMES)
-    recording = read(tmp_path / "out-ur5e-3.mcap")
-    assert recording.complete
-    assert replay_file(recording).first_difference is None
+    replayed(tmp_path / "out-ur5e-3.mcap")
 
 
 def test_killed_process_is_reported_with_its_robots_and_ends_the_others(tmp_path):
-    served = Served(*LOCKSTEP, "--record", str(tmp_path / "out.mcap"), name=None)
-    try:
-        served.wait_until_ready()
+    with Served(*LOCKSTEP, "--record", str(tmp_path / "out.mcap"), name=None) as served:
         states(served.endpoint, "ur5e-1")
-        first, second = workers(served)
+        _, first, second = processes(served)
         second.kill()
         assert served.wait() == 1
-        assert (
-            "worker 2 of 2 (ur5e-2, ur5e-3) was ended by SIGKILL: the other robots were also" in served.said
-        )
+        assert "worker 2 of 2 (ur5e-2, ur5e-3) was ended by SIGKILL: the other robots were" in served.said
         assert not first.is_running()
         assert read(tmp_path / "out-ur5e-1.mcap").complete
-        served.assert_quiet()
-    finally:
-        served.kill()
 
 
 def test_killed_front_process_is_reported_and_ends_the_others():
-    served = Served(*LOCKSTEP, name=None)
-    try:
-        served.wait_until_ready()
-        front, *others = sorted(psutil.Process(served.process.pid).children(), key=lambda child: child.pid)
+    with Served(*LOCKSTEP, name=None) as served:
+        front, *others = processes(served)
         front.kill()
         assert served.wait() == 1
         assert "the process that clients connect to was ended by SIGKILL: the other robots" in served.said
         assert not [other for other in others if other.is_running()]
-        served.assert_quiet()
-    finally:
-        served.kill()
 
 
 def test_port_in_use_is_refused_and_leaves_no_recordings(served, tmp_path):

@@ -12,7 +12,7 @@ import sys
 import time
 
 HOME = (-1.60, -1.727, -2.203, -0.808, 1.595, -0.031)
-FAR = (-0.10, *HOME[1:5], 1.469)
+FAR = (-0.10, *HOME[1:5], 1.469)  # with the base and the last joint turned
 PROGRAM = """def driver():
   global q = get_target_joint_positions()
   global going = True
@@ -48,10 +48,10 @@ def wave(number):
     return [angle + 0.2 * math.sin(0.01 * number) for angle in HOME]
 
 
-def steer(stream, numbers):
+def steer(stream, postures):
     """Send joint positions, and read the answers."""
-    for number in numbers:
-        stream.sendall(struct.pack(">6i", *(round(1e6 * angle) for angle in wave(number))))
+    for q in postures:
+        stream.sendall(struct.pack(">6i", *(round(1e6 * angle) for angle in q)))
         stream.recv(4096)
         time.sleep(0.002)
 
@@ -62,20 +62,12 @@ def cut(stream):
     stream.close()
 
 
-def jump(stream):
-    """Send a distant posture, with the base and the last joint turned."""
-    for _ in range(60):
-        stream.sendall(struct.pack(">6i", *(round(1e6 * angle) for angle in FAR)))
-        stream.recv(4096)
-        time.sleep(0.002)
-
-
 FAULTS = {
     "cut": cut,
     "frozen": lambda _: os.kill(os.getpid(), signal.SIGSTOP),
     "torn": lambda stream: (stream.sendall(b"\1\2\3\4\5"), time.sleep(1.0)),
     "absurd": lambda stream: (stream.sendall(struct.pack(">6i", *[2**31 - 1] * 6)), time.sleep(0.5)),
-    "jumping": jump,
+    "jumping": lambda stream: steer(stream, [FAR] * 60),
 }
 
 
@@ -86,7 +78,7 @@ def main(host, fault):
             script.sendall(PROGRAM.format(host=host, port=port).encode())
             stream, _ = server.accept()
         stream.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        steer(stream, range(30))
+        steer(stream, map(wave, range(30)))
         FAULTS[fault](stream)
 
 

@@ -5,20 +5,15 @@ import subprocess
 import sys
 from pathlib import Path
 
-HERE = Path(__file__).parent
-
-
-def started(program, *arguments):
-    """Start a program of this folder in a process of its own."""
-    command = [sys.executable, str(HERE / program), *map(str, arguments)]
-    return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+CALLER = Path(__file__).with_name("ur_caller.py")
 
 
 class Client:
     """An object of ur-rtde with its methods. What they raise becomes an AssertionError."""
 
     def __init__(self, module, kind, host, *numbers):
-        self.process = started("ur_caller.py", module, kind, host, *numbers)
+        command = [sys.executable, CALLER, module, kind, host, *map(str, numbers)]
+        self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
 
     def __enter__(self):
         try:

@@ -19,12 +19,11 @@ def test_release_changes_every_place_of_the_version():
     for place in BUMP["files"]:
         files = list(ROOT.glob(place.get("glob") or place["filename"]))
         assert files
-        search = (
-            place["search"].format(current_version=present) if not place.get("regex") else place["search"]
-        )
+        search = place["search"]
+        if not place.get("regex"):
+            search = re.escape(search.format(current_version=present))
         for file in files:
-            text = file.read_text(encoding="utf-8")
-            assert re.search(search, text) if place.get("regex") else search in text, file
+            assert re.search(search, file.read_text(encoding="utf-8")), file
     for file in [ROOT / "pyproject.toml", *ROOT.glob("*/pyproject.toml")]:
         text = file.read_text(encoding="utf-8")
         own = re.findall(r'^version = "(.+)"|"tvist[\w-]*(?:\[[\w,-]+\])?==([^"; ]+)', text, re.MULTILINE)
@@ -57,8 +56,6 @@ def test_installed_distribution_must_be_the_built_one(tmp_path, digest, same):
         wheel.writestr(record, f"tvist.py,sha256=x,1\n{record},,\n")
     there = tmp_path / "lib" / "python3" / "site-packages" / record
     there.parent.mkdir(parents=True)
-    there.write_text(
-        f"../../bin/tvist,sha256=z,1\ntvist.py,sha256={digest},1\n{record},,\n", encoding="utf-8"
-    )
+    there.write_text(f"../../bin/tvist,sha256=z,1\ntvist.py,sha256={digest},1\n{record},,\n")
     with contextlib.nullcontext() if same else pytest.raises(FailedError, match="is not the one of tvist-9"):
         check_is_built(tmp_path / "tvist-9-py3.whl", tmp_path)

@@ -1,4 +1,4 @@
-"""Recorded runs that several test files draw."""
+"""Recorded runs that several test files draw, and a browser."""
 
 import asyncio
 
@@ -9,6 +9,8 @@ from tvist_lab.in_process import free_setup, robot_in_process, run_beside
 from tvist_plant.description import load
 from tvist_view.look import Look
 from tvist_view.track import Track
+
+from .browser import browser
 
 POSES = load("ur5e").poses
 
@@ -38,3 +40,10 @@ def tracks():
         look = Look(info.geometry, info.payload)
         found.append(Track(label, look, collected.states, collected.truths))
     return found
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    """A browser, until the end of a file: playwright suffers no other event loop beside its own."""
+    with browser() as started:
+        yield started

@@ -18,12 +18,11 @@ from tvist_view.playback import playback
 from tvist_view.stage import page
 from tvist_view.track import Track
 
-from .browser import browser
-
 SEVEN = "tests/plant/urdf/seven.urdf"
 ARMS = ("ur5e", SEVEN, "one-joint")
 """Arms of the page; the first one moves."""
 UR5E = load("ur5e")
+BODY = Capsule(name="x", link=5, start=(0, 0, 0), end=(0, 0, 1), radius=0.1)
 
 
 def look_of(name):
@@ -44,10 +43,7 @@ def standing(moved, look):
         ({"a": [0.1]}, "1 a, 2 d and 2 alpha"),
         ({"a": [], "d": [], "alpha": []}, "no joints"),
         ({"bending": [2]}, "link 2: must be 0 to 1"),
-        (
-            {"capsules": [Capsule(name="x", link=5, start=(0, 0, 0), end=(0, 0, 1), radius=0.1)]},
-            "link 5: must be -1 to 1",
-        ),
+        ({"capsules": [BODY]}, "link 5: must be -1 to 1"),
     ],
 )
 def test_geometry_that_cannot_be_drawn_is_refused(changes, says):
@@ -77,12 +73,6 @@ def test_bodies_of_a_world_are_nan_while_unknown(moved):
     for row in (there.row(state, None), there.row(state, truth)):
         assert len(row) == len(look.row(state, truth)) + 6
         assert np.isnan(row[-6:]).all()
-
-
-@pytest.fixture(scope="module")
-def chromium(moved):  # whose event loop playwright would not suffer beside its own
-    with browser() as started:
-        yield started
 
 
 def undrawn(chromium):

@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 from PIL import Image
 from tests.conformance.served import PATIENCE, Served, finished, free_endpoint
-from tests.conformance.wire import TICK, Wire
+from tests.conformance.wire import STOPPED, TICK, Wire
 
-from .browser import Page, browser
+from .browser import Page
 
 pytestmark = pytest.mark.realtime
 
-STOPPED = 1
 FIRST, SECOND = "ur5e-1", "ur5e-2"
 SMALL = {"width": 400, "height": 400}  # window: drawing takes a processor
 MS = PATIENCE * 1000.0
@@ -23,12 +22,6 @@ MS = PATIENCE * 1000.0
 SIZES = {"wide": {"width": 1280, "height": 800}, "phone": {"width": 390, "height": 844}}
 HIGH = """() => { const seen = tvist.stage.scene.filled(); return seen && (seen.y[1] - seen.y[0]) / 2; }"""
 """Share of the scene's height that the arm takes, by the page's own projection."""
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    with browser() as started:
-        yield started
 
 
 @pytest.fixture(scope="module")
@@ -45,11 +38,7 @@ def view(served):
 
 @pytest.fixture(scope="module")
 def tab(chromium, view):
-    page = chromium.new_page(viewport=SMALL)
-    page.set_default_timeout(MS)
-    page.asked = []
-    page.on("request", lambda request: page.asked.append(request.url))
-    page.goto(view.url)
+    page = opened(chromium, view)
     page.get_by_text("RUNNING, NORMAL").wait_for()
     yield page
     page.close()
@@ -65,6 +54,8 @@ def wire(served):
 def opened(chromium, view, **options):
     page = chromium.new_page(**({"viewport": SMALL} | options))
     page.set_default_timeout(MS)
+    page.asked = []
+    page.on("request", lambda request: page.asked.append(request.url))
     page.goto(view.url)
     return page
 
@@ -128,9 +119,7 @@ def test_motion_of_the_page_moves_the_arm(tab, wire):
     tab.get_by_role("button", name="front → left").click()
     moving(wire)
     target = wire.info()["poses"]["Q2"]
-    wire.wait(
-        "state", lambda state: max(abs(a - b) for a, b in zip(state["target_q"], target, strict=True)) < 1e-9
-    )
+    wire.wait("state", lambda state: state["target_q"] == pytest.approx(target, abs=1e-9))
     tab.get_by_role("button", name="Give back control").click()
     tab.get_by_text("Nobody has control.").wait_for()
     while wire.info()["control"] is not None:

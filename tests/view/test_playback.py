@@ -1,18 +1,14 @@
 """Recorded and compared runs: on the page, and as a page of its own."""
 
-import sys
-import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
 from tests.conformance.served import finished
+from tests.system.conftest import called  # noqa: F401  a fixture
 
-from tvist_cli.main import main
 from tvist_view.playback import playback, said
 from tvist_view.track import Track, TrackError
-
-from .browser import browser
 
 OLD = Path(__file__).parents[1] / "journals" / "live_lost_lease.mcap"
 
@@ -57,30 +53,15 @@ def test_command_writes_a_page(tmp_path):
         (("--port", "70000"), 1, "port is 70000: must be 0 to 65535"),
     ],
 )
-def test_misuse_is_refused_in_one_line(arguments, code, says, monkeypatch, capsys):
-    monkeypatch.setattr(sys, "argv", ["tvist", "view", *arguments])
-    monkeypatch.setattr("tvist_cli.main.end_like_interrupted", lambda: None)  # signals are those of the tests
-    monkeypatch.setattr("os.nice", lambda _: None)  # and the priority
-    monkeypatch.setattr(warnings, "formatwarning", warnings.formatwarning)
-    with pytest.raises(SystemExit) as ended:
-        main()
-    told = capsys.readouterr().err
-    assert ended.value.code == code, told
-    assert says in told
-    assert told.startswith("tvist: ")
-    assert told.count("\n") == 1
+def test_misuse_is_refused_in_one_line(called, arguments, code, says, monkeypatch):  # noqa: F811
+    monkeypatch.setattr("os.nice", lambda _: None)  # the priority is that of the tests
+    called("view", *arguments).assert_failed(code, says)
 
 
 def test_recording_of_an_older_server_is_drawn_by_its_robot_file(tmp_path):
     ended = finished("-m", "tvist_cli", "view", OLD, "--html", tmp_path / "x.html")
     assert ended.returncode == 0, ended.stderr
     assert "drawn stiff" in (tmp_path / "x.html").read_text()
-
-
-@pytest.fixture(scope="module")
-def chromium(tracks):  # and after all tests that run an event loop, which playwright would not suffer
-    with browser() as started:
-        yield started
 
 
 def test_page_in_a_file_plays_and_seeks_without_network(chromium, tracks, tmp_path):

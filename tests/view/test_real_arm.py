@@ -4,7 +4,7 @@ import pytest
 from msgspec.structs import replace
 from tests.conformance.served import PATIENCE, Served
 from tests.places import free_endpoint, own_address
-from tests.view.browser import Page, browser
+from tests.view.browser import Page
 
 from tvist_controller.api.robot import LoopbackHost, info_of
 from tvist_lab.in_process import free_setup
@@ -60,14 +60,13 @@ def test_checklist_shows_the_speed_cap_and_the_reason_of_a_stop(info):
 
 @pytest.mark.nightly
 @pytest.mark.realtime
-def test_page_leads_through_the_checklist_and_disables_what_has_no_effect():
+def test_page_leads_through_the_checklist_and_disables_what_has_no_effect(chromium):
     host, endpoint = own_address(73), free_endpoint()
     robot = ("--ur", "--ur-address", host, "--hidden", "1001", "--profile", "real", "--shaper", "none")
     with (
         Served(*robot),
         Served("--plant", f"ur://{host}", name="arm", endpoint=endpoint) as arm,
         Page(endpoint, "--name", "arm") as page,
-        browser() as chromium,
     ):
         tab = chromium.new_page(viewport={"width": 1280, "height": 800})
         tab.set_default_timeout(PATIENCE * 1000.0)

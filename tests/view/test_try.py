@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.view import page_numbers
-from tests.view.browser import browser
 
 from tvist_shaping.catalogue import SHAPERS
 
@@ -15,12 +14,6 @@ FILE = ROOT / "view" / "tvist_view" / "try.html"
 SOURCES = ROOT / "view" / "page" / "try"
 PATIENCE_MS = 60_000.0
 PHONE, LAPTOP = {"width": 390, "height": 844}, {"width": 1280, "height": 800}
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    with browser() as started:
-        yield started
 
 
 @pytest.fixture(scope="module")
@@ -90,9 +83,7 @@ def test_filter_of_the_page_matches_the_library(page):
 
 
 def test_mass_of_the_page_matches_a_linear_simulation(page):
-    found = page.evaluate(
-        "([mode, believed]) => tried.swing(...mode, tried.SHAPERS.zv(...believed))", page_numbers.SWING
-    )
+    found = page.evaluate("([its, set]) => tried.swing(...its, tried.SHAPERS.zv(...set))", page_numbers.SWING)
     for key, wanted in page_numbers.swung().items():
         close(found[key], wanted)
 
@@ -174,7 +165,5 @@ def test_valid_own_shaper_is_judged_at_once(own):
 def test_every_word_of_the_page_is_used():
     words = json.loads((SOURCES / "words.json").read_text())
     code = "".join(path.read_text() for path in SOURCES.glob("*.ts"))
-    unused = [
-        key for key in words if f'"{key}"' not in code and not key.startswith(("tab_", "head_", "lead_"))
-    ]
-    assert not unused
+    idle = [key for key in words if f'"{key}"' not in code and not key.startswith(("tab_", "head_", "lead_"))]
+    assert not idle

@@ -1,11 +1,11 @@
 """`tvist serve --plant ur://… --enable-motion`, here called the bridge, and what moves and watches its robot."""
 
 import contextlib
-import socket
 
 import numpy as np
 from tests.conformance.served import Served
 from tests.places import own_address
+from tests.system.test_ur_lockstep import dashboard
 from tests.system.waiting import eventually
 
 from tvist_client import RefusedError
@@ -96,11 +96,5 @@ def largest_step(states):
 
 def tell(*lines):
     """Send lines to the robot's dashboard; return its answers."""
-    connection = socket.create_connection((HOST, DASHBOARD), 10.0)
-    with connection, connection.makefile("rw") as spoken:
-        spoken.readline()
-        answers = []
-        for line in lines:
-            print(line, file=spoken, flush=True)
-            answers.append(spoken.readline().strip())
-        return answers
+    with dashboard(HOST) as spoken:
+        return [spoken.ask(line) for line in lines]

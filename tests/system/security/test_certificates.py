@@ -104,9 +104,7 @@ class TestNoSession:
             assert certificates.why_refused(f"tcp/{place}", None) is None
             assert certificates.why_refused(f"tls/{place}", ring / "anna") is None
 
-    def test_with_an_expired_or_foreign_certificate_and_the_reason_is_reported(
-        self, served, ring, elsewhere, tmp_path
-    ):
+    def test_with_an_expired_or_foreign_certificate_and_reports_why(self, served, ring, elsewhere, tmp_path):
         expired = forge(tmp_path / "anna", "anna", issuer=signed(ring), days=-1)
         (expired / "authority.pem").write_bytes((ring / "authority.pem").read_bytes())
         for folder, why in ((expired, "certificate expired"), (elsewhere / "anna", "not trusted")):
@@ -146,15 +144,6 @@ def half_a_handshake():
     return hello.read()
 
 
-def a_hundred(endpoint, first=b""):
-    """Open a hundred connections that send `first` and nothing else."""
-    host, port = endpoint.partition("/")[2].split(":")
-    connections = [socket.create_connection((host, int(port))) for _ in range(100)]
-    for connection in connections:
-        connection.sendall(first)
-    return connections
-
-
 @pytest.mark.nightly
 @pytest.mark.parametrize(
     ("secure", "first"),
@@ -167,7 +156,10 @@ def test_hundred_connections_do_not_lock_clients_out(secure, first, ring):
     if secure:
         endpoint, options, keys = free_tls_endpoint(), ("--security", str(ring)), ring / "anna"
     with Served(*options, endpoint=endpoint), BlockingRobot.connect(endpoint, security=keys) as connected:
-        connections = a_hundred(endpoint, first)
+        host, port = endpoint.partition("/")[2].split(":")
+        connections = [socket.create_connection((host, int(port))) for _ in range(100)]
+        for connection in connections:
+            connection.sendall(first)
         with BlockingRobot.connect(endpoint, security=keys) as robot:
             tick = robot.info().tick
         for connection in connections:
