@@ -1,7 +1,6 @@
 """Moves by the hundred: what comes in, what is made of it, and that the answers are those of the line itself."""
 
 import json
-import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -16,7 +15,7 @@ from tvist_lab.study.catalogue import baselines, some
 from tvist_lab.study.held_out import interval
 from tvist_lab.study.line import PAPER, lengthened, point_to_point
 from tvist_lab.study.measures import WORTH
-from tvist_lab.study.moves import Move, MovesError, draw_moves, is_free, read_moves, write_moves
+from tvist_lab.study.moves import Move, MovesError, draw_moves, is_free, read_moves
 from tvist_lab.study.recipes import FrequencyError, Recipe, RecipeError
 from tvist_lab.study.request import StudyRequest
 from tvist_lab.study.shaping import shape
@@ -62,11 +61,6 @@ class TestFiles:
         )
         assert first == Move(tuple(HOME), tuple(but(0, 1.0)), 0.0)
         assert second == Move(tuple(HOME), tuple(but(1, 0.0)), 5.0)
-
-    def test_written_moves_are_read_back(self, tmp_path, ur5e):
-        moves = draw_moves(ur5e, 5, 1, (0.0, 5.0)).moves
-        write_moves(tmp_path / "moves.json", moves)
-        assert read_moves(tmp_path / "moves.json", ur5e, lambda: math.nan) == moves
 
     @pytest.mark.parametrize(
         ("content", "words"),
@@ -198,13 +192,10 @@ class TestMoves:
     def test_results_of_the_papers_motion_equal_the_published_ones(self, ur5e, paper, move):
         methods = (*some(["zv"], ur5e, paper), *baselines(paper, ur5e, (5.0, 5.0)))
         (job,) = study(StudyRequest(description=ur5e, moves=[move], methods=methods, named=1)).jobs()
-        shaped, waiting, longer, *others = measure(job)
+        shaped, waiting, longer, *_ = measure(job)
         assert shaped["reduction_percent"] > 80.0
         assert 28.0 <= shaped["delay_ms"] <= 38.0  # half a period at Q3, where the mode is at 15 Hz
         assert waiting["reduction_percent"] == waiting["delay_ms"] == 0.0
-        assert [longer["shaper"], *(row["shaper"] for row in others)] == [
-            "equal_duration_double_s", "double_s_of_one_period", "zv_frozen_at_end", "mzv_for_payload",
-            "ei_for_payload", "ei3_for_payload", "fixed_mzv", "fixed_ei2", "fixed_ei3",
-        ]  # fmt: skip
+        assert longer["shaper"] == "equal_duration_double_s"
         assert longer["delay_ms"] == pytest.approx(shaped["delay_ms"], abs=1.5e3 * PERIOD)
         assert longer["peak_acceleration_ratio"] <= 1.0 + 1e-9
