@@ -31,11 +31,6 @@ def paper():
 
 
 @pytest.fixture
-def move(ur5e):
-    return Move(ur5e.poses["Q1"], ur5e.poses["Q3"], 5.0)
-
-
-@pytest.fixture
 def written(tmp_path, ur5e):
     """Write a file and read it as moves."""
 
@@ -113,8 +108,8 @@ class TestDraws:
 
 
 class TestLine:
-    def test_double_S_of_given_duration_takes_that_time(self, move):
-        start, target = np.array(move.start), np.array(move.target)
+    def test_double_S_of_given_duration_takes_that_time(self, ur5e):
+        start, target = np.array(ur5e.poses["Q1"]), np.array(ur5e.poses["Q3"])
         for ticks in (len(point_to_point(start, target)) + extra for extra in (0, 7, 40, 150)):
             longer = lengthened(start, target, ticks)
             assert abs(len(longer) - ticks) <= 1
@@ -189,7 +184,8 @@ class TestReport:
 
 
 class TestMoves:
-    def test_results_of_the_papers_motion_equal_the_published_ones(self, ur5e, paper, move):
+    def test_results_of_the_papers_motion_equal_the_published_ones(self, ur5e, paper):
+        move = Move(ur5e.poses["Q1"], ur5e.poses["Q3"], 5.0)
         methods = (*some(["zv"], ur5e, paper), *baselines(paper, ur5e, (5.0, 5.0)))
         (job,) = study(StudyRequest(description=ur5e, moves=[move], methods=methods, named=1)).jobs()
         shaped, waiting, longer, *_ = measure(job)
