@@ -24,10 +24,7 @@ from tvist_lab.workspace import WORKSPACE
 from tvist_plant.plant import PERIOD
 from tvist_shaping.estimators.fixed import Fixed
 
-
-@pytest.fixture(scope="module")
-def paper():
-    return calibrations.load("ur5e_5kg")
+KNOWN = calibrations.load("ur5e_5kg")
 
 
 @pytest.fixture
@@ -129,18 +126,18 @@ class TestRecipes:
         np.testing.assert_allclose(zeta, [0.1, 0.2])
         assert (wrong.modes, wrong.f_d_min, wrong.zeta_max) == (2, 8.0, 0.2)
 
-    def test_several_modes_of_a_polynomial_and_an_unknown_shaper_are_refused(self, ur5e, paper):
+    def test_several_modes_of_a_polynomial_and_an_unknown_shaper_are_refused(self, ur5e):
         with pytest.raises(RecipeError, match="tvist identify"):
-            Recipe("zv", paper, modes=3).make(ur5e, 5.0)
+            Recipe("zv", KNOWN, modes=3).make(ur5e, 5.0)
         with pytest.raises(RefusalError, match="zz"):
-            Recipe("zz", paper).make(ur5e, 5.0)
+            Recipe("zz", KNOWN).make(ur5e, 5.0)
 
 
 @pytest.fixture
-def report(ur5e, paper):
+def report(ur5e):
     """Make the report of moves with these unshaped and shaped peaks."""
     drawn = draw_moves(ur5e, 1, 0, (0.0, 5.0)).moves
-    made = study(StudyRequest(description=ur5e, moves=drawn, methods=some(["zv"], ur5e, paper), named=1))
+    made = study(StudyRequest(description=ur5e, moves=drawn, methods=some(["zv"], ur5e, KNOWN), named=1))
 
     def of(*peaks):
         rows = [
@@ -184,9 +181,9 @@ class TestReport:
 
 
 class TestMoves:
-    def test_results_of_the_papers_motion_equal_the_published_ones(self, ur5e, paper):
+    def test_results_of_the_papers_motion_equal_the_published_ones(self, ur5e):
         move = Move(ur5e.poses["Q1"], ur5e.poses["Q3"], 5.0)
-        methods = (*some(["zv"], ur5e, paper), *baselines(paper, ur5e, (5.0, 5.0)))
+        methods = (*some(["zv"], ur5e, KNOWN), *baselines(KNOWN, ur5e, (5.0, 5.0)))
         (job,) = study(StudyRequest(description=ur5e, moves=[move], methods=methods, named=1)).jobs()
         shaped, waiting, longer, *_ = measure(job)
         assert shaped["reduction_percent"] > 80.0

@@ -167,9 +167,8 @@ class TestResuming:
     @pytest.mark.usefixtures("whole")
     def test_run_of_another_sweep_is_not_continued(self, tmp_path, old, new, what):
         other = tasks_of(tmp_path, SPEC.replace(old, new))
-        with pytest.raises(
-            StoreError, match=rf"whole holds a study with other {what}.*: give another --output"
-        ):
+        words = rf"whole holds a study with other {what}.*: give another --output"
+        with pytest.raises(StoreError, match=words):
             run(other, tmp_path / "whole", Quick())
 
     @pytest.mark.usefixtures("whole")
