@@ -30,85 +30,64 @@ def modal():
     return calibrations.load("ur5e_modal")
 
 
-@pytest.fixture(scope="session")
-def make_recording():
+def make_recording(
+    reference=None,
+    target=None,
+    *,
+    ticks=1500,
+    position=None,
+    rotation=None,
+    alpha=None,
+    truth=None,
+    events=(),
+    **columns,
+):
     """Build a recording from arrays; what is not given rests."""
-
-    def make(
-        reference=None,
-        target=None,
-        *,
-        ticks=1500,
-        first_tick=0,
-        position=None,
-        rotation=None,
-        alpha=None,
-        truth=None,
-        events=(),
-        **columns,
-    ):
-        tick = first_tick + np.arange(ticks)
-        up = np.tile([0.0, 0.0, 9.81], (ticks, 1))
-        zeros = np.zeros((ticks, JOINTS))
-        of_joints = {
-            name: np.zeros((ticks, JOINTS)) if q is None else np.column_stack([q, zeros[:, 1:]])
-            for name, q in (("reference_q", reference), ("target_q", target))
-        }
-        made = {name: np.zeros(ticks) for name in STATE_COLUMNS}
-        made |= dict.fromkeys(("target_qd", "target_qdd", "target_moment"), zeros)
-        made |= dict.fromkeys(("actual_q", "actual_qd", "actual_moment", "actual_TCP_speed"), zeros)
-        made |= of_joints
-        made["tick"] = tick.astype(float)
-        made["timestamp"] = tick * PERIOD
-        made["actual_TCP_pose"] = np.zeros((ticks, 6))
-        made["actual_TCP_pose"][:, :3] = 0.0 if position is None else position
-        made["actual_TCP_pose"][:, 3:] = 0.0 if rotation is None else rotation
-        made["actual_tool_accelerometer"] = up + (0.0 if alpha is None else alpha)
-        made["estimated_f_d"] = np.full((ticks, 1), 10.0)
-        made["estimated_zeta"] = np.full((ticks, 1), 0.2)
-        if truth is not None:
-            made["truth_tool_acceleration"] = up + truth
-        return Recording({**made, **columns}, tuple(events))
-
-    return make
+    tick = np.arange(ticks)
+    up = np.tile([0.0, 0.0, 9.81], (ticks, 1))
+    zeros = np.zeros((ticks, JOINTS))
+    of_joints = {
+        name: np.zeros((ticks, JOINTS)) if q is None else np.column_stack([q, zeros[:, 1:]])
+        for name, q in (("reference_q", reference), ("target_q", target))
+    }
+    made = {name: np.zeros(ticks) for name in STATE_COLUMNS}
+    made |= dict.fromkeys(("target_qd", "target_qdd", "target_moment"), zeros)
+    made |= dict.fromkeys(("actual_q", "actual_qd", "actual_moment", "actual_TCP_speed"), zeros)
+    made |= of_joints
+    made["tick"] = tick.astype(float)
+    made["timestamp"] = tick * PERIOD
+    made["actual_TCP_pose"] = np.zeros((ticks, 6))
+    made["actual_TCP_pose"][:, :3] = 0.0 if position is None else position
+    made["actual_TCP_pose"][:, 3:] = 0.0 if rotation is None else rotation
+    made["actual_tool_accelerometer"] = up + (0.0 if alpha is None else alpha)
+    made["estimated_f_d"] = np.full((ticks, 1), 10.0)
+    made["estimated_zeta"] = np.full((ticks, 1), 0.2)
+    if truth is not None:
+        made["truth_tool_acceleration"] = up + truth
+    return Recording({**made, **columns}, tuple(events))
 
 
-@pytest.fixture(scope="session")
-def one_motion(make_recording):
+def one_motion(shaped_ticks=0, **columns):
     """A motion of one joint from tick 100 to 500, published a tick later and shaped by so many ticks more."""
-
-    def make(shaped_ticks=0, **columns):
-        ticks = columns.setdefault("ticks", 1500)
-        reference = straight_step(ticks, 100, 500, 1.0)
-        target = straight_step(ticks, 101, 501 + shaped_ticks, 1.0)
-        return make_recording(reference, target, **columns)
-
-    return make
+    ticks = columns.setdefault("ticks", 1500)
+    reference = straight_step(ticks, 100, 500, 1.0)
+    target = straight_step(ticks, 101, 501 + shaped_ticks, 1.0)
+    return make_recording(reference, target, **columns)
 
 
-@pytest.fixture
-def event():
+def event(tick, kind, identifier=None):
     """An event as the protocol has it."""
-
-    def make(tick, kind, identifier=None):
-        return SimpleNamespace(tick=tick, kind=kind, id=identifier, code=None, why=None)
-
-    return make
+    return SimpleNamespace(tick=tick, kind=kind, id=identifier, code=None, why=None)
 
 
-@pytest.fixture(scope="session")
-def ring():
+def ring(ticks, start, f_d, zeta, amplitude, *, axis=(1.0, 0.0, 0.0), phase=0.0):
     """A damped sine on given axes from a tick on, zero before."""
-
-    def make(ticks, start, f_d, zeta, amplitude, *, axis=(1.0, 0.0, 0.0), phase=0.0):
-        wave = damped(PERIOD * (np.arange(ticks) - start), f_d, zeta, phase)
-        return amplitude * wave[:, None] * (np.array(axis) / np.linalg.norm(axis))
-
-    return make
+    wave = damped(PERIOD * (np.arange(ticks) - start), f_d, zeta, phase)
+    return amplitude * wave[:, None] * (np.array(axis) / np.linalg.norm(axis))
 
 
 @pytest.fixture(scope="session")
-def recorded(one_motion, ring):
+def recorded():
     """The same motion without and with shaping."""
     ticks = 1500
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.lab.conftest import one_motion, ring
 
 from tvist_lab.identification.workspace_map import WorkspaceMap
 from tvist_lab.metrics import motions
@@ -60,31 +61,29 @@ def published(name):
 ENTRY = {"reduction_percent_median": 90.0, "reduction_percent_p5": 80.0, "delay_ms_median": 50.0}
 MODES = np.array([np.linspace(7.0, 9.0, 5), np.linspace(0.2, 0.3, 5)])
 MAKERS = {
-    "figure_1": lambda made, _, __: made.figure_1(),
-    "figure_3": lambda made, _, __: made.figure_3(),
-    "figure_4": lambda made, _, __: made.figure_4(),
-    "figure_8": lambda made, _, __: made.figure_8(),
+    "figure_1": lambda made, *_: made.figure_1(),
+    "figure_3": lambda made, *_: made.figure_3(),
+    "figure_4": lambda made, *_: made.figure_4(),
+    "figure_8": lambda made, *_: made.figure_8(),
     "figure_15": lambda made, pair, _: made.figure_15("Q1-Q2", *pair),
     "after_stop": lambda made, pair, _: made.after_stop_figure(*pair, "Q1-Q2"),
     "ring_down": lambda made, pair, _: made.ring_down_figure("Q1-Q2", pair[0]),
-    "sensitivity": lambda made, _, __: made.sensitivity_figure(
-        [SHAPERS["zv"]], 0.0, np.linspace(-0.4, 0.6, 51)
-    ),
-    "settling_against_delay": lambda made, _, __: made.settling_against_delay_figure(
+    "sensitivity": lambda made, *_: made.sensitivity_figure([SHAPERS["zv"]], 0.0, np.linspace(-0.4, 0.6, 51)),
+    "settling_against_delay": lambda made, *_: made.settling_against_delay_figure(
         SHAPERS.values(), 10.0, 0.1
     ),
-    "settling": lambda made, _, __: made.settling_figure(published("leaderboard")["summary"]),
-    "robustness": lambda made, _, __: made.robustness_figure(cells(published("robustness")), ERRORS),
-    "moves": lambda made, _, __: made.residual_by_move_figure(judged(4)),
-    "no move that counts": lambda made, _, __: made.residual_by_move_figure(judged(2, counts=False)),
+    "settling": lambda made, *_: made.settling_figure(published("leaderboard")["summary"]),
+    "robustness": lambda made, *_: made.robustness_figure(cells(published("robustness")), ERRORS),
+    "moves": lambda made, *_: made.residual_by_move_figure(judged(4)),
+    "no move that counts": lambda made, *_: made.residual_by_move_figure(judged(2, counts=False)),
     "one_move": lambda made, pair, _: made.vibration_figure(pair[0][0], pair[1][0], 3),
-    "identified": lambda made, _, __: made.identified_figure("mine", MODES, 1.02 * MODES),
+    "identified": lambda made, *_: made.identified_figure("mine", MODES, 1.02 * MODES),
     "map": lambda made, _, found: made.workspace_map_figure(found, "f_d_hz", "an arm"),
     "compared": lambda made, pair, _: made.compared_figure(
         [made.ComparedPanel("Q1 → Q2", {"without": pair[0], "with zv": pair[1]}, "90 % less")] * 2,
         ["without"],
     ),
-    "sweep": lambda made, _, __: made.sweep_figure(
+    "sweep": lambda made, *_: made.sweep_figure(
         [{"shaper": name, **ENTRY} for name in ("zv", "auto")] * 2, ["5 kg", "1 kg"] * 2
     ),
 }
@@ -252,7 +251,7 @@ def test_figures_12_to_14_have_the_papers_five_panels_on_one_clock(figures, reco
     assert "repeatability, 0.03 mm" in texts(figure.axes[1])
 
 
-def test_figure_16_labels_the_drawn_rv_and_no_decay_in_noise(figures, recorded, one_motion):
+def test_figure_16_labels_the_drawn_rv_and_no_decay_in_noise(figures, recorded):
     noise = 0.06 * np.random.default_rng(1).standard_normal((TICKS, 3))
     noisy = one_motion(37, alpha=noise)
     found = motions(noisy)[0]
@@ -279,9 +278,7 @@ def test_example_is_the_median_of_the_counted_moves(counts, drawn):
 @pytest.mark.parametrize(
     ("amplitude", "changed", "gained"), [(0.1, "less", "earlier"), (4.0, "more", "later")]
 )
-def test_overview_states_reduction_and_earlier_rest_of_its_curves(
-    figures, one_motion, ring, amplitude, changed, gained
-):
+def test_overview_states_reduction_and_earlier_rest_of_its_curves(figures, amplitude, changed, gained):
     pair = []
     for ticks, size in ((0, 1.0), (10, amplitude)):
         recording = one_motion(ticks, truth=ring(TICKS, 501 + ticks, 10.0, 0.1, size))

@@ -10,8 +10,6 @@ from mcap.reader import make_reader
 from scipy.spatial.transform import Rotation
 
 from tvist_cli.commands.log.export import export as export_command
-from tvist_cli.failure import Failure
-from tvist_cli.log_options import LogOptions
 from tvist_controller.about import info_of
 from tvist_controller.controller import Controller
 from tvist_lab.foxglove.export import export
@@ -138,7 +136,3 @@ def test_truncated_file_is_exported_up_to_the_damage(run, tmp_path, capsys):
     export_command(cut, to="foxglove")
     assert "was not closed; it could be read up to tick" in capsys.readouterr().err
     assert read(tmp_path / "cut.foxglove.mcap").counts == read(cut).counts
-    with pytest.raises(Failure, match=r"foxglove\.mcap exists already"):
-        export_command(cut, to="foxglove")
-    with pytest.raises(Failure, match="--imu are for logs"):
-        export_command(cut, to="foxglove", logs=LogOptions(columns="time=t"))

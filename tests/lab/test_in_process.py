@@ -2,7 +2,7 @@
 
 import pytest
 
-from tvist_lab.in_process import free_setup, robot_in_process
+from tvist_lab.in_process import free_setup
 from tvist_server.config import ServeConfig
 from tvist_server.option_values import StartError
 
@@ -10,19 +10,13 @@ from tvist_server.option_values import StartError
 def test_given_options_override_the_configuration_in_process():
     for config in (None, ServeConfig(seed=1, shaper="ei"), ServeConfig()):
         found = free_setup(config, seed=7, shaper="zvd", start="Q2")
-        assert (found.seed, found.shaper) == (7, "zvd")
+        assert (found.seed, found.shaper, found.clock) == (7, "zvd", "free")
         assert found.q == found.description.poses["Q2"]
 
 
 def test_unchanged_options_are_those_of_the_configuration():
     found = free_setup(ServeConfig(shaper="ei", clock="lockstep"), seed=7)
     assert (found.shaper, found.clock, found.truth) == ("ei", "lockstep", False)
-
-
-async def test_configuration_of_a_served_robot_works_in_process():
-    async with robot_in_process(free_setup(ServeConfig(), seed=7)) as robot:
-        assert (await robot.state()).tick == 0
-        assert await robot.clock() == "free"
 
 
 @pytest.mark.parametrize("config", [None, ServeConfig()])

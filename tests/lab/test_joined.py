@@ -30,10 +30,10 @@ def wrong_by(found, devices):
     return np.abs(error).max(), abs((error[-1] - error[0]) / (true[-1] - true[0]))
 
 
-def join(folder, devices, robot=None, sensor=None, columns=None, imu_columns=None):
-    """Write both logs and join them."""
+def join(folder, devices, robot=None, sensor=None, columns=None, imu_columns=None, other=None):
+    """Write the logs of the robot and of its sensor, or that of other devices, and join them."""
     log = devices.robot(folder / "robot.csv", **(robot or {}))
-    imu = devices.sensor(folder / "imu.csv", **(sensor or {}))
+    imu = (other or devices).sensor(folder / "imu.csv", **(sensor or {}))
     return joined(read(log, columns), imu, imu_columns)
 
 
@@ -116,30 +116,25 @@ def test_notes_give_offset_and_drift_with_uncertainty(tmp_path):
     assert any("joined by its accelerometer" in note for note in notes)
 
 
-def unlike(folder):
-    return joined(read(TwoDevices(1).robot(folder / "robot.csv")), TwoDevices(2).sensor(folder / "imu.csv"))
-
-
-def without_accelerometer(folder):
-    return joined(read(TwoDevices(1).robot(folder / "robot.csv")), folder / "robot.csv")
-
-
 def seven_joints(folder):
     t = np.arange(0.0, 3.0, 0.01)
     log = write_csv(folder / "robot.csv", {"timestamp": t, "actual_q": np.sin(t)[:, None] * np.ones(7)})
     return joined(read(log), TwoDevices(1).sensor(folder / "imu.csv"))
 
 
-def of(sensor=None, **how):
-    return lambda folder: join(folder, TwoDevices(1, **how), sensor=sensor)
+def of(sensor=None, other=None, **how):
+    return lambda folder: join(folder, TwoDevices(1, **how), sensor=sensor, other=other)
 
 
 REFUSED = {
-    "another motion": (unlike, "is not that of the joint angles.*record both"),
+    "another motion": (of(other=TwoDevices(2)), "is not that of the joint angles.*record both"),
     "too little motion": (of(stroke=0.02), "too little: record both"),
     "motions that repeat": (of(same=True, motions=6, spare=-0.4), "motions repeat.*record both"),
     "one motion": (of(motions=1), "drift to .*record both"),
-    "no accelerometer": (without_accelerometer, "no actual_tool_accelerometer_0.*--imu-columns"),
+    "no accelerometer": (
+        of({"names": ("timestamp", "actual_q")}),
+        "no actual_tool_accelerometer_0.*--imu-columns",
+    ),
     "a rate of raw numbers": (of({"units": (1.0, 1.0, 0.001)}), "are the units"),
     "seven joints": (seven_joints, "7 joints, a UR5e has 6: give the robot with --robot"),
 }

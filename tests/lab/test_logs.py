@@ -92,9 +92,8 @@ def test_missing_columns_give_null_with_a_reason(tmp_path):
     for field in ("overshoot_m", "stabilisation_ms", "cycle_ms"):
         assert getattr(results[0], field) is None
         assert "actual_TCP_pose" in results[0].notes[field]
-    blind = analyze(
-        read(SyntheticLog(motions=1).without("actual_tool_accelerometer").csv(tmp_path / "blind.csv"))
-    )[0]
+    log = SyntheticLog(motions=1).without("actual_tool_accelerometer")
+    (blind,) = analyze(read(log.csv(tmp_path / "blind.csv")))
     for field in ("f_d_hz", "zeta", "residual_vibration_m_s2", "still_after_ms", "peak_m_s2"):
         assert getattr(blind, field) is None
         assert "actual_tool_accelerometer" in blind.notes[field]
@@ -132,10 +131,6 @@ def test_missing_rows_do_not_bias_the_fit(tmp_path):
 GOOD = SyntheticLog(motions=1).columns
 
 
-def lines_of(tmp_path):
-    return tmp_path / "log.csv", text(GOOD)
-
-
 def with_cell(lines, cell, row=300, column=4):
     cells = lines[row].split(",")
     cells[column] = cell
@@ -143,7 +138,7 @@ def with_cell(lines, cell, row=300, column=4):
 
 
 def test_empty_cell_is_missing_and_not_zero(tmp_path):
-    path, lines = lines_of(tmp_path)
+    path, lines = tmp_path / "log.csv", text(GOOD)
     place = lines[0].split(",").index("actual_tool_accelerometer_1")
     path.write_text("\n".join(with_cell(lines, "", 700, place)) + "\n")
     recording = read(path)
@@ -151,23 +146,11 @@ def test_empty_cell_is_missing_and_not_zero(tmp_path):
     assert all(within(result) for result in analyze(recording))
 
 
-def in_days(lines):
-    return lines[:1] + [f"{5e9 * n},{line.split(',', 1)[1]}" for n, line in enumerate(lines[1:])]
-
-
 EDITED = {
     "repeated": (lambda lines: lines[:500] + [lines[499]] * 3 + lines[500:], "3 rows .* line 501"),
     "torn": (lambda lines: [*lines[:800], lines[800][:40], *lines[801:]], "1 torn line .* line 801"),
     "swapped": (
-        lambda lines: [
-            *lines[:400],
-            lines[401],
-            lines[400],
-            *lines[402:900],
-            lines[901],
-            lines[900],
-            *lines[902:],
-        ],
+        lambda lines: [*lines[:400], *lines[401:399:-1], *lines[402:900], *lines[901:899:-1], *lines[902:]],
         "2 rows out of order sorted by timestamp, the first in line 402",
     ),
     "cut off": (lambda lines: [*lines[:-1], lines[-1][:-5]], "line 1501 has no end and was left out"),
@@ -177,8 +160,8 @@ EDITED = {
 @pytest.mark.parametrize("kind", EDITED)
 def test_damaged_lines_are_omitted_or_sorted_with_a_note(tmp_path, kind):
     change, words = EDITED[kind]
-    path, lines = lines_of(tmp_path)
-    path.write_text("\n".join(change(lines)))
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(change(text(GOOD))))
     recording = read(path)
     assert any(re.search(words, note) for note in recording.notes)
     assert np.all(np.diff(recording.time) > 0)
@@ -198,7 +181,10 @@ REFUSED = {
     "no header": (lambda lines: lines[1:], "line 1.*header.*counted from 1: --columns time=1,q=2-7"),
     "only a header": (lambda lines: lines[:1], "no rows"),
     "one row": (lambda lines: lines[:2], "1 row"),
-    "time in days": (in_days, "it must be in seconds"),
+    "time in days": (
+        lambda lines: lines[:1] + [f"{5e9 * n},{line.split(',', 1)[1]}" for n, line in enumerate(lines[1:])],
+        "it must be in seconds",
+    ),
     "no number of a robot": (
         lambda lines: with_cell(lines, "1e308"),
         r"line 301, column target_q_3: 1e\+308",
@@ -210,8 +196,8 @@ REFUSED = {
 @pytest.mark.parametrize("kind", REFUSED)
 def test_unusable_log_is_refused_with_file_and_line(tmp_path, kind):
     change, words = REFUSED[kind]
-    path, lines = lines_of(tmp_path)
-    path.write_text("\n".join(change(lines)) + "\n")
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(change(text(GOOD))) + "\n")
     with pytest.raises(RecordingError, match=words) as refused:
         read(path)
     assert "log.csv" in str(refused.value)

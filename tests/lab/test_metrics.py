@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from tests.lab.conftest import event, make_recording, one_motion, ring
 
 from tvist_lab.metrics import (
     MotionResult,
@@ -41,11 +42,11 @@ def steps(*spans):
     return sum(np.clip((tick - start) / (stop - start), 0.0, 1.0) for start, stop in spans)
 
 
-def test_motion_spans_the_last_tick_at_rest_to_the_last_moving_tick(one_motion):
+def test_motion_spans_the_last_tick_at_rest_to_the_last_moving_tick():
     assert motions(one_motion()) == [MotionRows(100, 500, 501, 1500)]
 
 
-def test_delay_excludes_the_tick_of_publication(one_motion):
+def test_delay_excludes_the_tick_of_publication():
     recording = one_motion(shaped_ticks=37)
     (motion,) = motions(recording)
     assert motion.duration(recording) == pytest.approx(0.8)
@@ -55,7 +56,7 @@ def test_delay_excludes_the_tick_of_publication(one_motion):
     assert motions(unshaped)[0].delay(unshaped) == 0.0
 
 
-def test_events_separate_motions_without_rest(make_recording, event):
+def test_events_separate_motions_without_rest():
     reference = steps((100, 500), (501, 900))
     told = ((101, "started", 1), (501, "done", 1), (502, "started", 2), (901, "done", 2))
     events = [event(tick, f"motion_{what}", number) for tick, what, number in told]
@@ -66,7 +67,7 @@ def test_events_separate_motions_without_rest(make_recording, event):
     assert first.end == second.start + 1
 
 
-def test_stopped_motion_is_marked_and_an_empty_one_omitted(one_motion, event):
+def test_stopped_motion_is_marked_and_an_empty_one_omitted():
     events = [event(50, "motion_started", 1), event(51, "motion_done", 1)]
     events += [event(101, "motion_started", 2), event(505, "motion_stopped", 2)]
     (motion,) = motions(one_motion(events=events))
@@ -74,7 +75,7 @@ def test_stopped_motion_is_marked_and_an_empty_one_omitted(one_motion, event):
     assert motion.stopped
 
 
-def test_a_rest_of_the_reference_starts_a_new_motion(make_recording):
+def test_a_rest_of_the_reference_starts_a_new_motion():
     reference = steps((100, 300), (400, 500))
     found = [
         (one.start, one.reference_stop, one.end) for one in motions(make_recording(reference, reference))
@@ -82,14 +83,14 @@ def test_a_rest_of_the_reference_starts_a_new_motion(make_recording):
     assert found == [(100, 300, 401), (400, 500, 1500)]
 
 
-def test_reset_of_the_simulation_ends_a_motion(make_recording):
+def test_reset_of_the_simulation_ends_a_motion():
     reference = steps((100, 500))
     reference[1000:] -= 0.7
     (motion,) = motions(make_recording(reference, np.roll(reference, 1)))
     assert motion == MotionRows(100, 500, 501, 1000)
 
 
-def test_times_are_right_with_missing_ticks(one_motion):
+def test_times_are_right_with_missing_ticks():
     recording = one_motion(shaped_ticks=20)
     kept = np.delete(np.arange(TICKS), np.arange(200, 260))
     thinned = type(recording)({name: column[kept] for name, column in recording.columns.items()})
@@ -98,7 +99,7 @@ def test_times_are_right_with_missing_ticks(one_motion):
     assert motion.delay(thinned) == pytest.approx(0.040)
 
 
-def test_robot_at_rest_has_no_motions(make_recording):
+def test_robot_at_rest_has_no_motions():
     assert motions(make_recording()) == []
     assert motions(make_recording(ticks=1)) == []
 
@@ -121,7 +122,7 @@ def drawn(points):
     return np.interp(np.arange(TICKS), ticks, values)
 
 
-def taken(one_motion, E, **columns):
+def taken(E, **columns):
     return with_motion(one_motion(position=along(E, (1.0, 2.0, -1.0)), **columns))
 
 
@@ -131,8 +132,8 @@ ONE_SWING = [
 ]  # fmt: skip
 
 
-def test_settling_is_interpolated_between_ticks(one_motion):
-    recording, motion = taken(one_motion, drawn(ONE_SWING))
+def test_settling_is_interpolated_between_ticks():
+    recording, motion = taken(drawn(ONE_SWING))
     settled = settling(recording, motion)
     assert settled.enter == pytest.approx((550.5 - 100) * 0.002, abs=1e-6)
     assert settled.cycle == pytest.approx((700.5 - 100) * 0.002, abs=1e-6)
@@ -141,16 +142,16 @@ def test_settling_is_interpolated_between_ticks(one_motion):
     np.testing.assert_allclose(attained_position(recording, motion), END, atol=1e-9)
 
 
-def test_tool_within_the_band_has_no_stabilisation_or_overshoot(one_motion):
+def test_tool_within_the_band_has_no_stabilisation_or_overshoot():
     E = drawn([(100, 0.5), (550, 4e-5), (551, 2e-5), (560, 2.5e-5), (700, 0.0)])
-    settled = settling(*taken(one_motion, E))
+    settled = settling(*taken(E))
     assert settled.stabilisation == settled.overshoot == 0.0
     assert settled.cycle == settled.enter
 
 
-def test_overshoot_counts_beyond_the_end(one_motion):
+def test_overshoot_counts_beyond_the_end():
     E = drawn([(100, -0.5), (540, -1e-4), (548, 3e-4), (600, 0.0)])
-    settled = settling(*taken(one_motion, E))
+    settled = settling(*taken(E))
     assert settled.overshoot == pytest.approx(3e-4)
     assert settled.stabilisation > 0.05
 
@@ -163,7 +164,7 @@ def test_overshoot_counts_beyond_the_end(one_motion):
         (-drawn([(100, 0.5), (600, 0.0)]), TICKS, "moved by less than"),
     ],
 )
-def test_settling_is_not_measurable_without_motion_and_rest(one_motion, E, ticks, why):
+def test_settling_is_not_measurable_without_motion_and_rest(E, ticks, why):
     position = along(drawn([(100, 0.5), (600, 0.0)]) + E)[:ticks]
     with pytest.raises(NotMeasurableError, match=why):
         settling(*with_motion(one_motion(ticks=ticks, position=position)))
@@ -175,7 +176,7 @@ STOP = 501
 @pytest.mark.parametrize(
     ("f_d", "zeta", "axis"), [(15.0, 0.14, (1.0, 0.0, 0.0)), (6.7, 0.1, (1.0, -2.0, 0.5))]
 )
-def test_rv_of_a_damped_sine_is_its_amplitude(one_motion, ring, f_d, zeta, axis):
+def test_rv_of_a_damped_sine_is_its_amplitude(f_d, zeta, axis):
     recording, motion = with_motion(one_motion(alpha=ring(TICKS, STOP, f_d, zeta, 1.2, axis=axis)))
     rv = residual(recording, motion)
     assert rv.fitted
@@ -186,7 +187,7 @@ def test_rv_of_a_damped_sine_is_its_amplitude(one_motion, ring, f_d, zeta, axis)
     assert rv.stop == pytest.approx(0.002 * STOP)
 
 
-def test_rv_with_fewer_than_two_peaks_is_the_largest_value(one_motion, ring):
+def test_rv_with_fewer_than_two_peaks_is_the_largest_value():
     recording, motion = with_motion(one_motion(alpha=ring(TICKS, STOP, 6.7, 0.34, 0.3)))
     rv = residual(recording, motion)
     assert not rv.fitted
@@ -196,13 +197,13 @@ def test_rv_with_fewer_than_two_peaks_is_the_largest_value(one_motion, ring):
     np.testing.assert_allclose(rv.curve(np.array([1.1, 1.2])), rv.value)
 
 
-def test_rv_counts_0_3_s_after_the_shaped_stop(one_motion):
+def test_rv_counts_0_3_s_after_the_shaped_stop():
     alpha = np.zeros((TICKS, 3))
     alpha[: STOP + 40 + 1, 0] = alpha[STOP + 40 + 152 :, 0] = 5.0
     assert residual(*with_motion(one_motion(40, alpha=alpha))).value == pytest.approx(0.0, abs=1e-12)
 
 
-def test_growing_peaks_are_fitted_by_a_constant(one_motion):
+def test_growing_peaks_are_fitted_by_a_constant():
     alpha = np.zeros((TICKS, 3))
     alpha[STOP + 20, 0], alpha[STOP + 60, 0] = 0.2, 0.3
     rv = residual(*with_motion(one_motion(alpha=alpha)))
@@ -217,21 +218,19 @@ def loud_until(tick, level=0.2):
 
 
 @pytest.mark.parametrize("shaped_ticks", [0, 37])
-def test_time_of_rest_counts_from_the_start_of_the_reference(one_motion, shaped_ticks):
+def test_time_of_rest_counts_from_the_start_of_the_reference(shaped_ticks):
     noise = np.random.default_rng(0).standard_normal((TICKS, 3))
     recording = one_motion(shaped_ticks, truth=loud_until(650), alpha=noise)
     assert still_after(*with_motion(recording)) == pytest.approx(550 * 0.002)
 
 
-def test_time_of_rest_is_zero_or_not_measurable_at_the_extremes(
-    one_motion,
-):
+def test_time_of_rest_is_zero_or_not_measurable_at_the_extremes():
     assert still_after(*with_motion(one_motion(truth=loud_until(650, 0.09)))) == 0.0
     with pytest.raises(NotMeasurableError, match="still exceeded"):
         still_after(*with_motion(one_motion(truth=loud_until(TICKS))))
 
 
-def test_peak_after_the_stop_omits_the_last_ramp_and_needs_the_truth(one_motion):
+def test_peak_after_the_stop_omits_the_last_ramp_and_needs_the_truth():
     truth = np.zeros((TICKS, 3))
     truth[541 + 5, 0] = 7.0
     truth[541 + 6, 0] = 0.4
@@ -242,7 +241,7 @@ def test_peak_after_the_stop_omits_the_last_ramp_and_needs_the_truth(one_motion)
 
 
 @pytest.mark.parametrize(("delay", "peak"), [(0.074, 0.5), (0.0, 2.0)])
-def test_vibration_counts_from_the_declared_delay(one_motion, delay, peak):
+def test_vibration_counts_from_the_declared_delay(delay, peak):
     truth = np.zeros((TICKS, 3))
     truth[: 501 + 37 + 1, 0] = 2.0
     truth[501 + 37 + 1, 0] = 0.5
@@ -250,14 +249,14 @@ def test_vibration_counts_from_the_declared_delay(one_motion, delay, peak):
     assert vibration_after_stop(*with_motion(recording))[0] == pytest.approx(peak)
 
 
-def test_envelope_is_the_amplitude_without_slow_drift(ring):
+def test_envelope_is_the_amplitude_without_slow_drift():
     alpha = ring(700, 0, 10.0, 0.02, 1.0, axis=(1.0, 1.0, 1.0), phase=1.0)
     assert np.max(envelope(alpha, 0.002)) == pytest.approx(1.0, abs=0.08)
     drift = np.tile(np.linspace(1.0, 2.0, 700)[:, None], (1, 3))
     assert np.max(envelope(drift, 0.002)[100:600]) < 0.05
 
 
-def test_rigid_acceleration_of_a_turning_tool_points_to_its_axis(make_recording):
+def test_rigid_acceleration_of_a_turning_tool_points_to_its_axis():
     t = 0.002 * np.arange(TICKS)
     q = np.clip(t - 0.2, 0.0, 2.0)
     recording = make_recording(q, np.roll(q, 1))
@@ -276,7 +275,7 @@ def test_rigid_acceleration_of_a_turning_tool_points_to_its_axis(make_recording)
     assert in_motion_rms(shaken, motion, rigid) == pytest.approx(0.5)
 
 
-def test_peak_acceleration_is_the_largest_of_any_joint(one_motion):
+def test_peak_acceleration_is_the_largest_of_any_joint():
     qdd, qd = np.zeros((2, TICKS, 6))
     qdd[300, 2], qd[400, 4] = -2.3, -1.4
     qdd[900, 0], qd[900, 0] = 50.0, 50.0
@@ -285,14 +284,14 @@ def test_peak_acceleration_is_the_largest_of_any_joint(one_motion):
     assert peak_velocity(recording, motion) == 1.4
 
 
-def test_tool_at_rest_in_any_orientation_has_no_acceleration(make_recording):
+def test_tool_at_rest_in_any_orientation_has_no_acceleration():
     orientations = Rotation.random(200, rng=np.random.default_rng(1))
     force = orientations.inv().apply([0.0, 0.0, 9.81])
     recording = make_recording(ticks=200, rotation=orientations.as_rotvec(), actual_tool_accelerometer=force)
     np.testing.assert_allclose(tool_acceleration(recording), 0.0, atol=1e-12)
 
 
-def test_acceleration_is_in_the_frame_of_the_flange(make_recording):
+def test_acceleration_is_in_the_frame_of_the_flange():
     turned = Rotation.from_rotvec([np.pi / 2, 0.0, 0.0])
     world = np.array([0.0, 0.0, 2.0])
     force = turned.inv().apply(world + np.array([0.0, 0.0, 9.81]))
@@ -303,7 +302,7 @@ def test_acceleration_is_in_the_frame_of_the_flange(make_recording):
     np.testing.assert_allclose(amplitude(alpha), 2.0)
 
 
-def test_missing_truth_is_reported(make_recording):
+def test_missing_truth_is_reported():
     with pytest.raises(RecordingError, match="was truth recorded"):
         tool_acceleration(make_recording(), truth=True)
     holes = np.full((1500, 3), np.nan)
@@ -313,7 +312,7 @@ def test_missing_truth_is_reported(make_recording):
     assert tool_acceleration(make_recording(truth=holes), truth=True, rows=slice(1, None)).shape == (1499, 3)
 
 
-def test_sensor_below_60_hz_replaces_missing_truth(make_recording):
+def test_sensor_below_60_hz_replaces_missing_truth():
     noise = 0.03 * np.random.default_rng(0).standard_normal((1500, 3))
     loud = amplitude(tool_acceleration(make_recording(alpha=noise)))
     quiet = amplitude(best_tool_acceleration(make_recording(alpha=noise)))
@@ -357,7 +356,7 @@ def test_unmeasurable_runs_are_omitted_from_the_mean_with_a_note():
     ]
 
 
-def test_recording_is_measured_motion_by_motion(one_motion, ring):
+def test_recording_is_measured_motion_by_motion():
     noise = 0.03 * np.random.default_rng(0).standard_normal((TICKS, 3))
     alpha = ring(TICKS, 538, 10.0, 0.1, 1.0, axis=(0.0, 1.0, 1.0))
     position = np.zeros((TICKS, 3))
@@ -374,7 +373,7 @@ def test_recording_is_measured_motion_by_motion(one_motion, ring):
     assert set(measured.notes) <= {"servo_lag_ms"}  # the made-up arm does not follow
 
 
-def test_unmeasurable_values_are_null_with_a_reason(one_motion):
+def test_unmeasurable_values_are_null_with_a_reason():
     (measured,) = analyze(one_motion(ticks=560))
     plain = json.loads(json.dumps(measured.as_dict(), allow_nan=False))
     missing = {"stabilisation_ms", "cycle_ms", "overshoot_m", "residual_vibration_m_s2", "f_d_hz", "zeta"}
@@ -384,7 +383,7 @@ def test_unmeasurable_values_are_null_with_a_reason(one_motion):
     assert "0.2 s" in plain["notes"]["f_d_hz"]
 
 
-def test_unfitted_rv_and_stopped_motion_are_noted(one_motion, event):
+def test_unfitted_rv_and_stopped_motion_are_noted():
     events = [event(101, "motion_started", 1), event(501, "motion_stopped", 1)]
     (measured,) = analyze(one_motion(events=events))
     assert measured.residual_vibration_m_s2 is not None

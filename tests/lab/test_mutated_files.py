@@ -127,10 +127,6 @@ def _csv(folder):
     return found
 
 
-def _dump(folder):
-    return [_log().dump(folder / "dump")]
-
-
 def _repacked(whole, folder, compression):
     """Copy an MCAP file; without compression, a changed byte changes a value."""
     from mcap.writer import CompressionType, Writer
@@ -174,7 +170,7 @@ def _mcap(folder):
 def _logs(folder):
     (folder / "run").mkdir()
     run = _repacked(TREE / "tests" / "journals" / "live_lost_lease.mcap", folder / "run", "NONE")
-    return [*_csv(folder), *_dump(folder), *_rosbag(folder), *_mcap(folder), run]
+    return [*_csv(folder), _log().dump(folder / "dump"), *_rosbag(folder), *_mcap(folder), run]
 
 
 def _parquet(folder):
@@ -197,25 +193,22 @@ def _npz(folder):
     return [path]
 
 
-def _program_contents():
+def _program(folder):
     from tests.server.polyscope_files import expression, move, saved, waypoint
 
     assigned = f"<Assignment><variable name='x'/>{expression('[1, 2.5]')}</Assignment>"
-    tree = saved(assigned, move(waypoint("A", (0, -1.5, 1, 0, 0, 0))), repeats=True)
-    return "def pick():\n  sync()\nend\n", tree, gzip.compress(tree.encode())
+    tree = saved(assigned, move(waypoint("A", (0, -1.5, 1, 0, 0, 0))), repeats=True).encode()
+    return _written("a.urp", "def pick():\n  sync()\nend\n", tree, gzip.compress(tree))(folder)
 
 
 def _written(name, *contents):
-    """Write files of these contents: a text, a path to copy, or a function that makes several."""
+    """Write files of these contents: a text, bytes, or a path to copy."""
 
     def write(folder):
-        made = contents[0]() if callable(contents[0]) else contents
-        found = [folder / f"{number}{name}" for number in range(len(made))]
-        for path, content in zip(found, made, strict=True):
-            if isinstance(content, str):
-                path.write_text(content, encoding="utf-8")
-            else:
-                path.write_bytes(content if isinstance(content, bytes) else content.read_bytes())
+        found = [folder / f"{number}{name}" for number in range(len(contents))]
+        for path, content in zip(found, contents, strict=True):
+            made = content.read_bytes() if hasattr(content, "read_bytes") else content
+            path.write_bytes(made.encode() if isinstance(made, str) else made)
         return found
 
     return write
@@ -293,7 +286,7 @@ ROBOTS = resources.files("tvist_plant") / "robots"
 
 KINDS = {
     "csv": (_csv, "recording"),
-    "dump": (_dump, "recording"),
+    "dump": (lambda folder: [_log().dump(folder / "dump")], "recording"),
     "rosbag": (_rosbag, "recording"),
     "mcap": (_mcap, "recording"),
     "parquet": (_parquet, "recording"),
@@ -309,7 +302,7 @@ KINDS = {
     "config": (_written("config.toml", CONFIG), "config"),
     "state": (_written("state.toml", STATE), "state"),
     "sweep": (_written("sweep.toml", SWEEP), "sweep"),
-    "program": (_written("a.urp", _program_contents), "program"),
+    "program": (_program, "program"),
 }  # for each kind of file, what writes good ones, and its reader
 
 

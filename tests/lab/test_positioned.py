@@ -26,14 +26,14 @@ ROBOT = load("ur5e")
 STANDS = (0.2, -1.3, 1.4, -1.7, -1.5, 0.1)
 
 
-async def planned(q=STANDS, ring_downs=6):
-    setup = replace(free_setup(calibration="none"), q=q)
+async def planned(ring_downs):
+    setup = replace(free_setup(calibration="none"), q=STANDS)
     async with robot_in_process(setup) as robot:
         return await plan_jogs(robot, ROBOT, ring_downs, seed=3, positions=True)
 
 
 async def test_every_path_is_free_and_keeps_base_and_outer_wrist():
-    plan = await planned()
+    plan = await planned(6)
     collisions, at = CollisionModel(ROBOT, body(plan.arm.payloads[0])), plan.at
     assert len(plan.jogs) == 6
     assert plan.seconds < 150.0
@@ -49,7 +49,7 @@ async def test_every_path_is_free_and_keeps_base_and_outer_wrist():
 
 async def test_jogs_stay_within_the_torques():
     """Its torque swings by as much again as that of a rigid arm, about its weight's."""
-    plan = await planned(ring_downs=8)
+    plan = await planned(8)
     dynamics = InverseDynamics(ROBOT, body(plan.arm.payloads[0]))
     for jog in plan.jogs:
         motion, way = quickest_motion(JointLine(jog.way[-1], jog.q), jog.limits), [jog.way[-1]]

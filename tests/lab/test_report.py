@@ -36,10 +36,8 @@ def recordings_verdict(paths):
 
 
 def test_verdict_reports_less_vibration_by_shaping(tmp_path):
-    before, after = (
-        log(tmp_path, "b.csv", LOUD, shaped_by=0.0),
-        log(tmp_path, "a.csv", QUIET, shaped_by=0.05, seed=2),
-    )
+    before = log(tmp_path, "b.csv", LOUD, shaped_by=0.0)
+    after = log(tmp_path, "a.csv", QUIET, shaped_by=0.05, seed=2)
     verdict = recordings_verdict([before, after])
     assert re.match(r"a.csv vibrates (7\d|8\d) % less after its stops than b.csv", verdict[0])
     assert "b.csv was not shaped: its target ends together with its reference." in verdict

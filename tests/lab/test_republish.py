@@ -73,18 +73,15 @@ def test_ticks_and_times_continue_in_a_loop(path):
     assert times == pytest.approx([0.008, 0.010, 0.012, 0.014, 0.016, 0.018])
 
 
-def test_playback_has_the_timing_of_the_recording(path, network, monkeypatch):
+async def test_playback_has_the_timing_of_the_recording(path, network, monkeypatch):
     waited = []
 
     async def sleep(seconds):
         waited.append(seconds)
 
-    async def run():
-        asyncio.get_running_loop().time = lambda: 7.0
-        await Playback(read(path), ["tcp/127.0.0.1:1"], speed=0.01).run()
-
     monkeypatch.setattr(asyncio, "sleep", sleep)
-    asyncio.run(run())
+    monkeypatch.setattr(asyncio.get_running_loop(), "time", lambda: 7.0)
+    await Playback(read(path), ["tcp/127.0.0.1:1"], speed=0.01).run()
     assert waited == pytest.approx([0.0, 0.2, 0.4])
 
 

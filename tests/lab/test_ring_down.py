@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tests.lab.conftest import ring
 from tests.lab.made_logs import damped
 
 from tvist_controller.setup import body, paper_payload
@@ -23,7 +24,7 @@ def direction(random):
     return {"axis": random.normal(size=3), "phase": random.uniform(0.0, 6.28)}
 
 
-def errors_percent(ring, cases, seeds, amplitude, *, second=0.0, tail=0.0, **options):
+def errors_percent(cases, seeds, amplitude, *, second=0.0, tail=0.0, **options):
     """Errors of f_d and ζ over cases and seeds, all of which can be measured."""
     errors = []
     for f_d, zeta in cases:
@@ -43,7 +44,7 @@ def errors_percent(ring, cases, seeds, amplitude, *, second=0.0, tail=0.0, **opt
 CASES = [(5.0, 0.03), (6.7, 0.34), (10.0, 0.2), (15.0, 0.14), (22.0, 0.08), (30.0, 0.4)]
 
 
-def test_fit_without_noise_is_exact(ring):
+def test_fit_without_noise_is_exact():
     for f_d, zeta in CASES:
         alpha = ring(TICKS, 0, f_d, zeta, 1.0, axis=(1.0, 2.0, -1.0), phase=0.7)
         fit = fit_ring_down(alpha, PERIOD)
@@ -54,35 +55,35 @@ def test_fit_without_noise_is_exact(ring):
         assert fit.r_squared == pytest.approx(1.0)
 
 
-def test_fit_with_sensor_noise_is_accurate(ring):
-    f_errors, zeta_errors = errors_percent(ring, CASES, 3, 1.0)
+def test_fit_with_sensor_noise_is_accurate():
+    f_errors, zeta_errors = errors_percent(CASES, 3, 1.0)
     assert np.median(f_errors) < 1.0
     assert np.percentile(f_errors, 90) < 4.0
     assert np.median(zeta_errors) < 3.0
     assert np.percentile(zeta_errors, 90) < 10.0
 
 
-def test_visible_second_mode_is_fitted(ring):
+def test_visible_second_mode_is_fitted():
     cases = [(5.0, 0.03), (10.0, 0.08), (22.0, 0.08)]
-    alone, _ = errors_percent(ring, cases, 2, 2.0, second=0.15)
-    together, zeta_errors = errors_percent(ring, cases, 2, 2.0, second=0.15, modes=2)
+    alone, _ = errors_percent(cases, 2, 2.0, second=0.15)
+    together, zeta_errors = errors_percent(cases, 2, 2.0, second=0.15, modes=2)
     assert np.median(together) < max(np.median(alone), 0.1)
     assert np.percentile(together, 90) < 2.0
     assert np.median(zeta_errors) < 3.0
 
 
-def test_second_mode_is_not_invented(ring):
+def test_second_mode_is_not_invented():
     fit = fit_ring_down(ring(TICKS, 0, 10.0, 0.1, 1.0) + noise(2), PERIOD, modes=2)
     assert fit.modes == 1
 
 
-def test_slow_tail_does_not_bias_the_mode(ring):
-    f_errors, zeta_errors = errors_percent(ring, CASES, 2, 1.0, tail=0.2, slow_poles=(SLOW_POLE,))
+def test_slow_tail_does_not_bias_the_mode():
+    f_errors, zeta_errors = errors_percent(CASES, 2, 1.0, tail=0.2, slow_poles=(SLOW_POLE,))
     assert np.median(f_errors) < 1.0
     assert np.median(zeta_errors) < 4.0
 
 
-def test_standard_errors_equal_the_deviation_of_repetitions(ring):
+def test_standard_errors_equal_the_deviation_of_repetitions():
     alpha = ring(TICKS, 0, 8.0, 0.2, 1.0, axis=(1.0, 1.0, 0.0), phase=0.4)
     fits = [fit_ring_down(alpha + noise(seed), PERIOD) for seed in range(20)]
     for name in ("f_d", "zeta"):
@@ -91,7 +92,7 @@ def test_standard_errors_equal_the_deviation_of_repetitions(ring):
     assert np.mean([fit.rms for fit in fits]) == pytest.approx(0.03, rel=0.05)
 
 
-def test_noise_and_tail_give_no_mode():
+def test_noise_tail_silence_and_a_short_recording_give_no_mode():
     for seed in range(6):
         fit = fit_ring_down(noise(seed), PERIOD)
         assert not fit.ok
@@ -99,16 +100,13 @@ def test_noise_and_tail_give_no_mode():
     decay = np.exp(-SLOW_POLE * PERIOD * np.arange(TICKS))
     tail = np.outer(decay, [0.5, 0.2, 0.0]) + noise(1)
     assert not fit_ring_down(tail, PERIOD, slow_poles=(SLOW_POLE,)).ok
-
-
-def test_silence_and_short_recording_are_not_measurable():
     assert not fit_ring_down(np.zeros((TICKS, 3)), PERIOD).ok
     short = fit_ring_down(noise(0)[:60], PERIOD)
     assert not short.ok
     assert "0.2 s are needed" in short.reason
 
 
-def test_skipped_time_is_ignored(ring):
+def test_skipped_time_is_ignored():
     alpha = ring(TICKS, 0, 9.0, 0.1, 1.0)
     alpha[:3] += 5.0
     assert fit_ring_down(alpha, PERIOD).f_d == pytest.approx(9.0, rel=1e-3)
@@ -122,20 +120,17 @@ def coloured(random, correlation, shape):
     return noise
 
 
-def draws(count, correlation):
-    """Fits of damped sines of random frequency, damping, direction and phase in noise, and the truth."""
-    for seed in range(count):
-        random = np.random.default_rng([seed, 40])
-        f_d, zeta = random.uniform(6.0, 25.0), random.uniform(0.05, 0.35)
-        alpha, _ = rung(random, [(f_d, zeta, 1.0)], 500.0, correlation, seconds=1.0)
-        yield fit_ring_down(alpha, PERIOD, modes=2, offset=True, evidence=SIGNIFICANT), f_d, zeta
-
-
 @pytest.mark.parametrize("correlation", [0.0, 0.9])
 @pytest.mark.parametrize(("count", "least"), [(8, 0.85), pytest.param(200, 0.90, marks=pytest.mark.nightly)])
 def test_intervals_contain_the_truth_at_their_confidence(count, least, correlation, measured):
     """Through white noise and that of a filtered sensor, of which few modes are made."""
-    fits = [draw for draw in draws(count, correlation) if draw[0].ok]
+    fits = []
+    for seed in range(count):
+        random = np.random.default_rng([seed, 40])
+        f_d, zeta = random.uniform(6.0, 25.0), random.uniform(0.05, 0.35)
+        alpha, _ = rung(random, [(f_d, zeta, 1.0)], 500.0, correlation, seconds=1.0)
+        fit = fit_ring_down(alpha, PERIOD, modes=2, offset=True, evidence=SIGNIFICANT)
+        fits += [(fit, f_d, zeta)] if fit.ok else []
     assert len(fits) > (0.8 if correlation else 0.99) * count
     if not correlation:
         assert np.median([abs(fit.f_d / f_d - 1.0) for fit, f_d, _ in fits]) < 0.02
@@ -148,7 +143,7 @@ def test_intervals_contain_the_truth_at_their_confidence(count, least, correlati
     assert several < 0.3  # eight of ten, if the colour does not count
 
 
-def test_missing_samples_do_not_bias_the_fit(ring):
+def test_missing_samples_do_not_bias_the_fit():
     kept = np.random.default_rng(0).random(TICKS) > 0.3
     kept[60:70] = False
     alpha = (ring(TICKS, 0, 10.0, 0.1, 1.0) + noise(3))[kept]

@@ -42,11 +42,6 @@ HONEST = """
 """
 
 
-def bench(ur5e, modal, *wanted):
-    """Waiting, and methods of the bench."""
-    return some(["none", *(wanted or names("bench"))], ur5e, modal)
-
-
 @pytest.fixture(scope="module")
 def task(ur5e):
     start, target = (np.array(ur5e.poses[name]) for name in ("Q1", "Q3"))
@@ -210,13 +205,13 @@ class TestDishonesty:
 
     @pytest.mark.parametrize("every", [False, pytest.param(True, marks=pytest.mark.nightly)])
     def test_listed_methods_pass_the_checks(self, ur5e, modal, task, every):
-        listed = bench(ur5e, modal)
+        listed = some(["none", *names("bench")], ur5e, modal)
         for candidate in listed if every else {type(one): one for one in listed}.values():
             assert inspect(candidate, ur5e, [task.move]) is None, candidate.name
             candidate.shaped(task)
 
     def test_method_that_gets_the_target_is_marked(self, ur5e, modal, task):
-        told = {one.name for one in bench(ur5e, modal) if one.told_target}
+        told = {one.name for one in some(names("bench"), ur5e, modal) if one.told_target}
         frozen = {"zv_frozen_at_end", "zv_3_modes_frozen_at_end"}
         assert told == {"auto-target", *frozen, "double_s_as_zv", "double_s_as_auto"}
 
@@ -288,7 +283,7 @@ class TestScores:
     def test_leaderboard_ranks_or_gives_the_reason(self, ur5e, modal, own):
         """One is found out before it moves, and one when it does."""
         early = replace(own("def step(q_ref, info):\n    return q_ref[:5]"), name="early")
-        standing = [*bench(ur5e, modal, "zv", "double_s_as_zv"), early]
+        standing = [*some(["none", "zv", "double_s_as_zv"], ur5e, modal), early]
         moves = draw_moves(ur5e, 1, 0, (0.0, 5.0)).moves
         facts = {"moves_made": 1, "seed": 0, "robot": "UR5e", "calibration": "", "command": ""}
         asked = StudyRequest(description=ur5e, moves=moves, methods=standing, quick=True, facts=facts)
@@ -314,7 +309,7 @@ class TestScores:
         assert lost["double_s_as_zv"]["fault"] == "gives NaN at tick 7 (payload error +0 %)"
 
     def test_all_shapers_of_references_run_curved_paths(self, ur5e, modal):
-        none, zv, planned = bench(ur5e, modal, "zv", "double_s_as_zv")
+        none, zv, planned = some(["none", "zv", "double_s_as_zv"], ur5e, modal)
         moves = draw_moves(ur5e, 2, 0, (0.0, 5.0)).moves
         assert bend(none, ur5e, moves) == pytest.approx(0.0, abs=1e-3)
         assert 0.5 < bend(zv, ur5e, moves) < 10.0

@@ -6,7 +6,6 @@ import ruckig
 
 from tvist_controller.sources.calibrations import load as load_calibration
 from tvist_lab.study.line import PAPER
-from tvist_lab.study.moves import WITH_WRISTS
 from tvist_lab.study.recipes import Recipe, longest_mean_delay
 from tvist_lab.workspace import WORKSPACE
 from tvist_plant.description import load
@@ -21,15 +20,14 @@ RETARGETED = (0.1, 1.5)
 """Shortest and longest time after which a stream turns to a new target, whether or not it has arrived [s]."""
 
 
-def retargeted(seconds, seed, *, wrists=True, together=False):
+def retargeted(seconds, seed, *, together=False):
     """A stream whose joints go to random targets and are called away from them, often before they are there.
 
-    The two outer joints of the wrist may rest at zero; all joints may arrive at the same time.
+    The two outer joints of the wrist rest at zero; all joints may arrive at the same time.
     """
     random, joints = np.random.default_rng(seed), UR5E.joints
-    region, ends = WITH_WRISTS if wrists else WORKSPACE, np.zeros((2, joints))
-    for end, side in zip(ends, (region.low, region.high), strict=True):
-        end[: len(side)] = side
+    ends = np.zeros((2, joints))
+    ends[:, : len(WORKSPACE.low)] = WORKSPACE.low, WORKSPACE.high
     generator = ruckig.Ruckig(joints, PERIOD)
     state, following = ruckig.InputParameter(joints), ruckig.OutputParameter(joints)
     state.max_velocity = [PAPER.velocity] * joints
@@ -73,7 +71,7 @@ def made(name, mass):
 def test_filter_without_a_target_follows_a_stream():
     tvist = made("auto-target", 5.0)
     before = tvist.estimator.estimate(np.zeros(6))[0][0]
-    stream = retargeted(4.0, 3, wrists=False)
+    stream = retargeted(4.0, 3)
     shaped = streamed(tvist, stream)
     assert abs(tvist.f_d[0] - before) > 0.02
     assert tvist.f_d[0] == pytest.approx(tvist.estimator.estimate(shaped[-1])[0][0], rel=0.02)
@@ -87,7 +85,7 @@ def test_long_streams_keep_velocity_and_99_percent_of_acceleration(name, most):
     """The rest is half the second derivative of the delays' variance: most for independent joints."""
     for number, mass in enumerate(MASSES):
         for together in (False, True):
-            stream = retargeted(SECONDS, 1000 + 10 * number + together, wrists=False, together=together)
+            stream = retargeted(SECONDS, 1000 + 10 * number + together, together=together)
             velocity, acceleration = peaks(streamed(made(name, mass), stream))
             assert velocity <= 1.00001, (mass, together)
             assert acceleration <= most, (mass, together)

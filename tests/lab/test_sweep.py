@@ -45,13 +45,7 @@ def tasks_of(folder, text=SPEC):
 
 
 class Quick:
-    """A runner that makes rows up from the tasks, in any order, and may be stopped.
-
-    Args:
-        order: Order of the places.
-        stop: Number of tasks after which Control+C is pressed.
-        fail: Positions of tasks that fail.
-    """
+    """A runner that makes rows up in any order; some tasks fail, and Control+C is pressed after so many."""
 
     def __init__(self, order=sorted, stop=10**9, fail=()):
         self.order, self.stop, self.fail, self.asked = order, stop, fail, []
@@ -173,9 +167,8 @@ class TestResuming:
     @pytest.mark.usefixtures("whole")
     def test_run_of_another_sweep_is_not_continued(self, tmp_path, old, new, what):
         other = tasks_of(tmp_path, SPEC.replace(old, new))
-        with pytest.raises(
-            StoreError, match=rf"whole holds a study with other {what}.*: give another --output"
-        ):
+        words = rf"whole holds a study with other {what}.*: give another --output"
+        with pytest.raises(StoreError, match=words):
             run(other, tmp_path / "whole", Quick())
 
     @pytest.mark.usefixtures("whole")

@@ -2,20 +2,14 @@
 
 import pytest
 
-from tvist_client import LoopbackTransport, Robot
 from tvist_client.readiness import look
 from tvist_client.unlock import make_ready
-from tvist_controller.loopback import LoopbackHost
-from tvist_lab.in_process import free_setup
-
-
-@pytest.fixture
-async def robot():
-    async with Robot.over(LoopbackTransport(LoopbackHost(free_setup()))) as robot:
-        yield robot
+from tvist_lab.in_process import free_setup, robot_in_process
 
 
 async def stopped(robot, arm, *faults, ticks=500):
+    await arm.move_j([1.0, -3.0, 0.0, -1.57, 0.0, 0.0], wait=False)
+    await robot.advance(300)
     for fault in faults:
         await arm.inject(fault)
     await robot.advance(ticks)
@@ -23,30 +17,16 @@ async def stopped(robot, arm, *faults, ticks=500):
 
 
 @pytest.mark.parametrize("ticks", [500, 2])
-async def test_protective_stop_is_unlocked_while_the_arm_stops(robot, ticks):
-    async with robot.control("me") as arm:
-        await arm.move_j([1.0, -3.0, 0.0, -1.57, 0.0, 0.0], wait=False)
-        await robot.advance(300)
+async def test_protective_stop_is_unlocked_while_the_arm_stops(ticks):
+    async with robot_in_process(free_setup()) as robot, robot.control("me") as arm:
         await stopped(robot, arm, "protective_stop", ticks=ticks)
         assert await make_ready(robot, arm) == ["unlocked the protective stop"]
         assert (await look(robot)).ready
 
 
-async def test_overloaded_arm_stops_again_with_a_reason(robot):
-    async with robot.control("me") as arm:
-        await arm.reset(payload=free_setup(payload=20.0, overload=True).payload)
-        await stopped(robot, arm)
-        done = ["unlocked the protective stop", "the robot stopped again at once"]
-        assert await make_ready(robot, arm) == done
-        found = await look(robot)
-        assert found.stop.code == "limit_torque"
-        assert "torque of joint" in found.why
-        assert "tvist unlock" in found.next
-
-
 @pytest.mark.parametrize(("fault", "found"), [("violation", "found a violation"), ("fault", "had failed")])
-async def test_safety_system_is_restarted_before_power_on(robot, fault, found):
-    async with robot.control("me") as arm:
+async def test_safety_system_is_restarted_before_power_on(fault, found):
+    async with robot_in_process(free_setup()) as robot, robot.control("me") as arm:
         await stopped(robot, arm, fault)
         (done,) = await make_ready(robot, arm)
         assert found in done
@@ -65,18 +45,10 @@ async def test_safety_system_is_restarted_before_power_on(robot, fault, found):
         (["protective_stop", "safeguard_stop"], "SAFEGUARD_STOP", ["unlocked the protective stop"]),
     ],
 )
-async def test_stop_that_a_client_cannot_release_remains(robot, faults, mode, done):
-    async with robot.control("me") as arm:
+async def test_stop_that_no_client_can_release_remains_without_a_wait(faults, mode, done):
+    async with robot_in_process(free_setup()) as robot, robot.control("me") as arm:
         await stopped(robot, arm, *faults)
         assert await make_ready(robot, arm, power_on=len(faults) == 1) == done
         found = await look(robot)
         assert (found.ready, found.safety_mode) == (False, mode)
         assert "release it" in found.next
-
-
-async def test_motion_paused_by_a_safeguard_is_not_awaited(robot):
-    async with robot.control("me") as arm:
-        await arm.move_j([1.0, -3.0, 0.0, -1.57, 0.0, 0.0], wait=False)
-        await robot.advance(300)
-        await stopped(robot, arm, "safeguard_stop")
-        assert await make_ready(robot, arm) == []

@@ -11,7 +11,7 @@ from tvist_controller.api.line import (
     paper_payload,
     quickest_motion,
 )  # fmt: skip
-from tvist_lab.study.line import PAPER, ControlLine, point_to_point
+from tvist_lab.study.line import PAPER, RESTING, ControlLine, point_to_point
 from tvist_lab.study.moves import draw_moves
 from tvist_lab.study.recipes import Recipe
 from tvist_lab.study.shaping import RunningFilter, shape
@@ -19,8 +19,6 @@ from tvist_plant.drives import DriveCommand
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.plant import PERIOD, PlantError, SimulatedArm
 from tvist_shaping.named import BUILT_IN
-
-RESTING = 4  # ticks at rest before the motion
 
 
 def by_ticks(description, recipe, move, seed):

@@ -6,7 +6,7 @@ from msgspec.structs import replace
 
 from tvist_controller.api.line import body, estimator_of, load_calibration, paper_payload
 from tvist_lab.identification.workspace_map import workspace_map
-from tvist_lab.study.moves import MovesError, draw_moves
+from tvist_lab.study.moves import draw_moves
 from tvist_lab.workspace import WORKSPACE, identified, workspace
 from tvist_plant.description import load
 from tvist_plant.flexible_arm import FlexibleArm
@@ -41,11 +41,6 @@ def test_random_moves_of_two_joints_keep_the_limits():
     moves = draw_moves(ONE_JOINT, 50, 0, (1.0, 1.0)).moves
     ends = np.array([end for move in moves for end in (move.start, move.target)])
     assert np.all(np.abs(ends) <= ONE_JOINT.limits.position)
-
-
-def test_wrists_are_refused_for_an_arm_without_them():
-    with pytest.raises(MovesError, match="wrists: a one-joint arm has 2 joints"):
-        draw_moves(ONE_JOINT, 1, 0, (1.0, 1.0), wrists=True)
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,5 @@
 """The calibration that ships is as good as it says; polynomials as in section 3.3 of the paper."""
 
-import asyncio
-
 import msgspec
 import numpy as np
 import pytest
@@ -20,24 +18,21 @@ from tvist_protocol.calibration import calibration_from_json, calibration_to_jso
 from tvist_server.config import ServeConfig
 from tvist_shaping import Polynomial
 
-
-@pytest.fixture(scope="module")
-def calibration():
-    return load_calibration("ur5e_5kg")
+CALIBRATION, ROBOT = load_calibration("ur5e_5kg"), load("ur5e")
 
 
 @pytest.mark.parametrize("name", ["Q1", "Q2", "Q3"])
-def test_calibration_gives_table_1_at_the_papers_poses(calibration, name):
+def test_calibration_gives_table_1_at_the_papers_poses(name):
     paper = published()["configurations"][name]
-    f_d, zeta = estimator_of(calibration).estimate(np.array(paper["q"]))
+    f_d, zeta = estimator_of(CALIBRATION).estimate(np.array(paper["q"]))
     assert f_d[0] == pytest.approx(paper["f_d_hz"], rel=0.05)
     assert zeta[0] == pytest.approx(paper["zeta"], rel=0.10)
 
 
-def test_calibration_is_accurate_at_random_configurations(calibration):
+def test_calibration_is_accurate_at_random_configurations():
     setup = ServeConfig().setup()
     arm = FlexibleArm(setup.description, setup.description.payload)
-    estimator = estimator_of(calibration)
+    estimator = estimator_of(CALIBRATION)
     errors = []
     for q in WORKSPACE.random(60, 6, seed=2024):
         modes = arm.modes(q)
@@ -48,31 +43,22 @@ def test_calibration_is_accurate_at_random_configurations(calibration):
     assert zeta_error < 0.10
 
 
-def test_calibration_has_its_origin_and_payload(calibration):
-    assert calibration.provenance.command.startswith("tvist identify")
-    assert calibration.provenance.configurations >= 100
-    assert fits(calibration, ServeConfig().setup().payload)
-    assert not fits(calibration, ServeConfig(payload=2.0).setup().payload)
-
-
-def test_calibration_spans_the_frequencies_of_the_workspace(calibration):
-    low, high = calibration.provenance.measured_f_d_range
+def test_calibration_has_its_origin_payload_and_frequencies():
+    assert CALIBRATION.provenance.command.startswith("tvist identify")
+    assert CALIBRATION.provenance.configurations >= 100
+    assert fits(CALIBRATION, ServeConfig().setup().payload)
+    assert not fits(CALIBRATION, ServeConfig(payload=2.0).setup().payload)
+    low, high = CALIBRATION.provenance.measured_f_d_range
     assert low == pytest.approx(6.5, rel=0.05)
     assert high > 15.0
 
 
-ROBOT = load("ur5e")
-
-
 @pytest.mark.nightly
-def test_small_identification_is_near_the_truth():
-    async def run():
-        setup = free_setup(calibration="none", seed=11)
-        async with robot_in_process(setup) as robot, robot.control("test") as arm:
-            plan = await plan_jogs(robot, ROBOT, 120, seed=11)
-            return await make_jogs(robot, arm, plan, lambda _: None)
-
-    found = calibrate(ROBOT, asyncio.run(run()), name="test", command="a test", progress=lambda _: None)
+async def test_small_identification_is_near_the_truth():
+    setup = free_setup(calibration="none", seed=11)
+    async with robot_in_process(setup) as robot, robot.control("test") as arm:
+        jogs = await make_jogs(robot, arm, await plan_jogs(robot, ROBOT, 120, seed=11), lambda _: None)
+    found = calibrate(ROBOT, jogs, name="test", command="a test", progress=lambda _: None)
     calibration = found.calibration
     assert found.no_polynomial == ""
     assert calibration.provenance.cross_validated_f_d_percent.median < 8.0

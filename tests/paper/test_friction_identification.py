@@ -99,13 +99,10 @@ def test_identified_friction_is_compensated_with_every_shaper(measured):
     assert median["with", "auto"] > 94.0 > median["without", "auto"]
 
 
-def test_friction_without_free_path_is_not_measured():
-    async def run():
-        async with robot_in_process(free_setup()) as robot, robot.control("test") as control:
+async def test_friction_without_free_path_is_not_measured():
+    async with robot_in_process(free_setup()) as robot, robot.control("test") as control:
+        with pytest.raises(IdentificationError, match="no path of"):
             await identify_friction(robot, control, ROBOT, [np.zeros(6)])
-
-    with pytest.raises(IdentificationError, match="no path of"):
-        asyncio.run(run())
 
 
 def test_friction_of_some_joints_or_beyond_the_torque_is_refused():

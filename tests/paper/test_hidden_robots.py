@@ -1,6 +1,5 @@
 """A robot that nobody knows is identified, as a client."""
 
-import asyncio
 from dataclasses import replace as changed
 
 import numpy as np
@@ -41,24 +40,20 @@ def hidden(seed):
     return replace(arm, links=links), float(random.uniform(0.5, 5.0))
 
 
-def identified(arm, mass):
+async def identified(arm, mass):
     """Weigh the payload, declare it, and identify springs and friction; with the robot time that it takes [s]."""
-
-    async def run():
-        plant = OwnPlant("test", "", lambda _, carried: FlexibleArm(arm, carried))
-        setup = changed(free_setup(calibration="none", truth=False), plant=plant)
-        async with robot_in_process(setup) as robot, robot.control("test") as control:
-            disc = paper_payload(ROBOT, mass)
-            await control.reset(payload=make_payload(mass, disc.com, disc.inertia))
-            began = (await robot.state()).tick
-            payload = await identify_payload(robot, control, ROBOT, progress=lambda _: None)
-            told = payload.payload
-            await control.set_payload(told.mass, told.com, told.inertia)
-            jogs = await make_jogs(robot, control, await plan_jogs(robot, ROBOT), lambda _: None)
-            done = calibrate(ROBOT, jogs, name="hidden", command="a test", progress=lambda _: None)
-            return payload, done.calibration, 0.002 * ((await robot.state()).tick - began)
-
-    return asyncio.run(run())
+    plant = OwnPlant("test", "", lambda _, carried: FlexibleArm(arm, carried))
+    setup = changed(free_setup(calibration="none", truth=False), plant=plant)
+    async with robot_in_process(setup) as robot, robot.control("test") as control:
+        disc = paper_payload(ROBOT, mass)
+        await control.reset(payload=make_payload(mass, disc.com, disc.inertia))
+        began = (await robot.state()).tick
+        payload = await identify_payload(robot, control, ROBOT, progress=lambda _: None)
+        told = payload.payload
+        await control.set_payload(told.mass, told.com, told.inertia)
+        jogs = await make_jogs(robot, control, await plan_jogs(robot, ROBOT), lambda _: None)
+        done = calibrate(ROBOT, jogs, name="hidden", command="a test", progress=lambda _: None)
+        return payload, done.calibration, 0.002 * ((await robot.state()).tick - began)
 
 
 def true_values(arm):
@@ -92,9 +87,9 @@ def left_out(arm, mass, declared, known):
 
 
 @pytest.mark.nightly
-def test_hidden_robot_is_identified_within_its_intervals(measured):
+async def test_hidden_robot_is_identified_within_its_intervals(measured):
     arm, mass = hidden(SEED)
-    payload, known, seconds = identified(arm, mass)
+    payload, known, seconds = await identified(arm, mass)
     found, true, inside = payload.payload.mass, true_values(arm), []
     assert seconds < 100.0
     assert abs(found - mass) < min(0.3, 3.0 * payload.mass_deviation)
