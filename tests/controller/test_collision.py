@@ -100,6 +100,8 @@ def test_a_colliding_move_is_refused_with_bodies_and_time(robot):
     assert reply.code == "collision"
     assert "floor" in reply.why
     assert "s after the start" in reply.why
+    before = robot.tick().target_q
+    assert robot.tick(50).target_q == before
     assert robot.send(c.MoveJ, q=tuple(Q2)) == Accepted(id=1)
 
 

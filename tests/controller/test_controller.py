@@ -29,6 +29,14 @@ def moving(robot: Robot, ticks: int = 200) -> int:
     return accepted.id
 
 
+def test_a_motion_starts_at_the_next_tick_and_is_done_at_rest(robot):
+    assert robot.send(c.MoveJ, q=Q2_) == Accepted(id=1)
+    last = robot.until_rest()
+    told = [(event.kind, event.id, event.tick) for event in robot.events]
+    assert told == [("motion_started", 1, 1), ("motion_done", 1, last.tick)]
+    assert last.reference_q == list(Q2_)
+
+
 def test_a_stop_reports_a_limited_deceleration(robot):
     moving(robot)
     robot.send(c.Stop, deceleration=1e5)

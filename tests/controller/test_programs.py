@@ -316,6 +316,8 @@ def test_a_new_program_replaces_the_running_one_and_waits_for_rest(robot, move):
     finish(robot)
     assert failure(robot) is None
     assert said(robot) == ["1"]
+    if move.startswith("movej"):
+        np.testing.assert_allclose(robot.states[-1].reference_q, NEAR, atol=1e-9)
     kinds = [(event.kind, event.program) for event in robot.events if event.kind.startswith("program_")]
     assert kinds == [(f"program_{what}", name) for name in ("one", "two") for what in ("started", "stopped")]
     assert (np.abs(np.diff(robot.column("target_qd"), axis=0)) / 0.002).max() < 40.0

@@ -130,6 +130,8 @@ WRONG = [
     (PATH | {"segments": [LINE | {"pos": 1}]}, "unknown_field", "segments[0].pos", "you mean 'pose'", None),
     (PATH | {"segments": [LINE | {"pose": [0] * 5}]}, "out_of_range", "segments[0].pose", "exactly 6", 6),
     (TAKE | {"client": ""}, "out_of_range", "client", "1 to 64 printable", None),
+    (TAKE | {"client": "a\n"}, "out_of_range", "client", "printable", None),
+    (TAKE | {"client": "**"}, "out_of_range", "client", "printable", None),
     (TAKE | {"client": "@me"}, "out_of_range", "client", "the first not @", None),
     (TAKE | {"lease_s": 0.05}, "out_of_range", "lease_s", "0.1", 0.1),
     (TAKE | {"lease_s": 3601}, "out_of_range", "lease_s", "3600", 3600),

@@ -127,6 +127,17 @@ def test_set_points_on_wildcards_or_too_large_are_counted_and_dropped(gateway, i
     assert gateway.setpoints_refused == 3
 
 
+def test_a_client_is_seen_before_its_next_command_and_when_it_leaves(gateway, intake, endpoint):
+    for number in range(5):
+        client = connect(endpoint)
+        _token = client.liveliness().declare_token(f"tvist/ur5e/client/me {number}")
+        replies(client, "tvist/ur5e/command", b"take")
+        assert intake.next() == ("seen", f"me {number}", "")
+        assert intake.next() == ("request", b"take")
+        client.close()
+        assert intake.next() == ("gone", f"me {number}", "")
+
+
 def test_the_end_of_a_session_is_reported_while_another_holds_its_token(gateway, intake, endpoint):
     with connect(endpoint) as copy:
         client = connect(endpoint)

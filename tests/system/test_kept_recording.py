@@ -56,7 +56,9 @@ def test_killed_server_leaves_a_recording_that_can_be_read_and_replayed(tmp_path
     content = read(path)
     assert not content.complete
     assert "was not closed" in content.note
-    assert content.states[-1].tick > began  # a chunk holds some 70 states
+    ticks = [state.tick for state in content.states]
+    assert ticks == sorted(set(ticks))
+    assert ticks[-1] >= began + 150  # at most a chunk of some 70 states is lost
     assert replay_file(content).first_difference is None
 
 
