@@ -139,7 +139,7 @@ class Calibration(_Part, frozen=True, kw_only=True):
     """The lowest mode with that payload, for the estimator `polynomial`."""
     modal: ModalModel | None = None  # any mode with any payload, for the estimator `modal`
     servo_lag_s: Annotated[float, Meta(gt=0, le=1)] | None = None
-    """T of a robot that follows set-points p as q̈ = k (p - q - T q̇), from set-points to angles [s]; null: unknown."""
+    """Lag T of angles q behind set-points p, in a robot with q̈ = k (p - q - T q̇) [s]; null: unknown."""
     servo_gain: Annotated[float, Meta(gt=0, le=1e6)] | None = None
     """k of the same equation [1/s²]; null: unknown."""
     provenance: Provenance  # origin of the calibration

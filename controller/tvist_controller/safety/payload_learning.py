@@ -147,7 +147,7 @@ class PayloadLearning:
         self._under_way.append((self._later(study), learnt))
 
     def _record(self, sample: Sample, present: Callable[[], FilterState]) -> _Motion | None:
-        """Record a tick with drives on; return the motion it ends, if any. Motions begin with `present()`."""
+        """Record a tick with drives on, and `present()` as a motion begins; return any motion it ends."""
         resting, done, motion = sample.mode.at_rest, None, self._motion
         if not resting and (motion is None or motion.stop):
             done, motion = motion, _Motion(present())
