@@ -1,20 +1,12 @@
-"""As a client, move a robot to the place of a measurement, and collect its messages."""
+"""Collect all messages of a robot while a block runs."""
 
-from collections.abc import Awaitable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import TypeVar
 
-import numpy as np
-
-from tvist_client.arm import Arm
-from tvist_client.motion import Motion
 from tvist_client.robot import Robot
-from tvist_lab.recordings import Floats, Recording
-from tvist_protocol.errors import RefusedError
+from tvist_lab.recordings import Recording
 from tvist_protocol.stream import Event, State, Truth
-
-Result = TypeVar("Result")
 
 
 @dataclass
@@ -51,26 +43,3 @@ def collect(robot: Robot) -> Iterator[Collected]:
     finally:
         for end in ends:
             end()
-
-
-async def unless_collision(measuring: Awaitable[Result]) -> Result | None:
-    """Await a motion or measurement; return None if the robot refuses it because of a collision."""
-    try:
-        return await measuring
-    except RefusedError as error:
-        if error.reply.code != "collision":
-            raise
-        return None
-
-
-async def reach(arm: Arm, q: Floats) -> Motion:
-    """Move to a configuration; if the straight line collides, move via the upright arm.
-
-    Raises RefusedError with code `collision` if the way via the upright arm collides, too.
-    """
-    if (there := await unless_collision(arm.move_j(q))) is not None:
-        return there
-    upright = np.zeros_like(q)
-    upright[[joint for joint in (1, 3) if joint < len(q)]] = -np.pi / 2
-    await arm.move_j(upright)
-    return await arm.move_j(q)

@@ -17,8 +17,9 @@ from scipy.optimize import least_squares, nnls
 from tvist_client.arm import Arm
 from tvist_client.robot import Robot
 from tvist_controller.api.line import MotionLimits
-from tvist_lab.collect import collect, reach, unless_collision
+from tvist_lab.collect import collect
 from tvist_lab.identification.ring_downs import IdentificationError
+from tvist_lab.identification.travel import reach, unless_collision
 from tvist_lab.identification.unknowns import Unknown, parameter
 from tvist_lab.metrics import motions
 from tvist_lab.metrics.ring_down import widening

@@ -26,7 +26,7 @@ from tvist_controller.api.line import (
     body,
     quickest_motion,
 )
-from tvist_lab.collect import collect, unless_collision
+from tvist_lab.collect import collect
 from tvist_lab.identification.design import LIMITS, choose, free_configurations, jog_of
 from tvist_lab.identification.friction import identify_friction
 from tvist_lab.identification.ring_downs import (
@@ -38,6 +38,7 @@ from tvist_lab.identification.ring_downs import (
     stops_of,
 )
 from tvist_lab.identification.servo_response import ServoResponse, servo_response
+from tvist_lab.identification.travel import unless_collision
 from tvist_lab.identification.unknowns import ArmModes
 from tvist_lab.recordings import Floats, Recording
 from tvist_plant.description import RobotDescription

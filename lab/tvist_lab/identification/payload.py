@@ -18,9 +18,10 @@ import pinocchio as pin
 from tvist_client.arm import Arm
 from tvist_client.robot import Robot
 from tvist_controller.api.line import CollisionModel, body, paper_payload
-from tvist_lab.collect import collect, reach, unless_collision
+from tvist_lab.collect import collect
 from tvist_lab.identification.design import most_informative
 from tvist_lab.identification.ring_downs import IdentificationError, Progress, check_model
+from tvist_lab.identification.travel import reach, unless_collision
 from tvist_lab.identification.unknowns import ball, heavier
 from tvist_lab.recordings import Floats, Recording
 from tvist_lab.workspace import workspace
