@@ -2,10 +2,9 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 import numpy as np
-import polars as pl
 
 from tvist_lab.metrics.agreed_modes import agreed_modes, lighter_beside
 from tvist_lab.metrics.common_clock import (
@@ -20,6 +19,9 @@ from tvist_lab.metrics.paper import Residual, Settling, residual, settling
 from tvist_lab.metrics.ring_down import SIGNIFICANT, SKIP, SLOW_POLE, Mode, RingDown, fit_ring_down
 from tvist_lab.metrics.vibration import NotMeasurableError
 from tvist_lab.recordings import MissingColumnError, Recording
+
+if TYPE_CHECKING:
+    import polars as pl
 
 COLUMNS = ("delay_ms", "stabilisation_ms", "cycle_ms", "overshoot_m", "residual_vibration_m_s2")
 """Columns of Table 2, in the paper's order."""
@@ -37,7 +39,7 @@ Row: TypeAlias = dict[str, float | None]
 Table: TypeAlias = dict[str, dict[str, Row]]
 """`unshaped`, `shaped` and `impact_percent` of each motion, structured like `table_2` in the paper's data."""
 T = TypeVar("T")
-Quantity = TypeVar("Quantity", float, pl.Expr)
+Quantity = TypeVar("Quantity", float, "pl.Expr")
 
 
 @dataclass(frozen=True)
