@@ -132,28 +132,32 @@ def pages() -> dict[str, str]:
 def _tables() -> dict[str, str]:
     """Return the Markdown of every table of the generated pages, by its name."""
     return {
-        "keys": _table(("key", "kind", "by", "carries", "what"), map(_channel_row, CHANNELS)),
+        "keys": markdown_table(("key", "kind", "by", "carries", "what"), map(_channel_row, CHANNELS)),
         "commands": _messages(COMMANDS),
         "setpoint": _messages((Setpoint,)),
         "parts": _messages(
             (Payload, Registers, StepSetpoint, JointSegment, LineSegment, ProcessSegment, ArcSegment)
         ),
         "replies": _messages(REPLIES),
-        "codes": _table(("code", "meaning"), ((f"`{code}`", text) for code, text in CODE_MEANINGS.items())),
+        "codes": markdown_table(
+            ("code", "meaning"), ((f"`{code}`", text) for code, text in CODE_MEANINGS.items())
+        ),
         "streams": _messages((State, Event, Truth, Telemetry, Io)),
-        "events": _table(("kind", "meaning"), ((f"`{kind}`", text) for kind, text in EVENT_MEANINGS.items())),
+        "events": markdown_table(
+            ("kind", "meaning"), ((f"`{kind}`", text) for kind, text in EVENT_MEANINGS.items())
+        ),
         "info": _messages((Info, Limits, Stopping, StopReason, CalibrationInfo)),
-        "modes": _table(("field", "numbers"), map(_mode_row, (RobotMode, SafetyMode, RuntimeState))),
-        "activities": _table(
+        "modes": markdown_table(("field", "numbers"), map(_mode_row, (RobotMode, SafetyMode, RuntimeState))),
+        "activities": markdown_table(
             ("state", "`robot_mode`", "`safety_mode`", "meaning"), map(_activity_row, Activity)
         ),
         "transitions": diagram(Activity),
         "control": diagram(Control),
         "stepping": diagram(Stepping),
-        "happenings": _table(
+        "happenings": markdown_table(
             ("trigger", "meaning"), ((f"`{name}`", text) for name, text in HAPPENINGS.items())
         ),
-        "faults": _table(
+        "faults": markdown_table(
             ("fault", "meaning", "needs"),
             ((f"`{name}`", fault.meaning, _needs(fault)) for name, fault in FAULTS.items()),
         ),
@@ -200,7 +204,7 @@ def _message(kind: Struct, schema: Schema) -> str:
         (f"`{field}`", _values(part), _default(field, part, schema), part["description"])
         for field, part in fields.items()
     )
-    return f"### `{name}`\n\n{text}\n\n{_table(('field', 'values', 'default', 'meaning'), rows)}"
+    return f"### `{name}`\n\n{text}\n\n{markdown_table(('field', 'values', 'default', 'meaning'), rows)}"
 
 
 def _default(field: str, part: Schema, schema: Schema) -> str:
@@ -250,5 +254,6 @@ def _number(bound: float) -> str:
     return powers.get(int(bound)) or f"{bound:g}".replace("e+0", "e")
 
 
-def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
+def markdown_table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
+    """Return a table of a generated page."""
     return "\n".join(f"| {' | '.join(line)} |" for line in (head, ("---",) * len(head), *rows))

@@ -1,10 +1,10 @@
 """`python -m tvist_controller.programs.table`: prints docs/reference/generated/urscript-functions.md."""
 
-from collections.abc import Sequence
 from inspect import getdoc
 
 from tvist_controller.programs.functions.unsimulated import SUBJECTS
 from tvist_controller.programs.library import FAMILIES, known_signatures
+from tvist_protocol.pages import markdown_table
 from tvist_urscript import METHOD, REQUIRED, Signature, signatures
 
 HEAD = """# URScript functions
@@ -34,7 +34,7 @@ def page() -> str:
             (f"`{_call(name, one)}`", "waits" if one.blocks else "", _what(functions, name))
             for name, one in signatures(functions).items()
         ]
-        parts.append(f"## {functions.title}\n\n{_table(('function', '', 'what'), rows)}\n")
+        parts.append(f"## {functions.title}\n\n{markdown_table(('function', '', 'what'), rows)}\n")
     costs = sorted({one.cost for one in known_signatures().values() if one.cost > 1}, reverse=True)
     dear = [
         (
@@ -43,7 +43,7 @@ def page() -> str:
         )
         for cost in costs
     ]
-    parts.append(f"## Costs\n\n{COSTS}\n\n{_table(('evaluations', 'functions'), dear)}\n")
+    parts.append(f"## Costs\n\n{COSTS}\n\n{markdown_table(('evaluations', 'functions'), dear)}\n")
     missing = [
         (f"`{name}`", what)
         for name, (_, what) in sorted(SUBJECTS.items(), key=lambda row: (row[1][1], row[0]))
@@ -51,7 +51,7 @@ def page() -> str:
     ]
     parts.append(
         "## Not simulated\n\nThese, and methods such as `handle.call()`, end the program with an error that names them."
-        f"\n\n{_table(('function', 'subject'), missing)}\n"
+        f"\n\n{markdown_table(('function', 'subject'), missing)}\n"
     )
     return "\n".join(parts)
 
@@ -71,10 +71,6 @@ def _shown(value: object) -> str:
 def _what(functions: type, name: str) -> str:
     text = getdoc(getattr(functions, name)) or ""
     return " ".join(text.partition("\n\n")[0].split())
-
-
-def _table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
-    return "\n".join(f"| {' | '.join(line)} |" for line in [head, ("---",) * len(head), *rows])
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """`python -m tvist_server.gateways.ur.rtde.table`: prints docs/reference/generated/rtde-variables.md."""
 
 from tvist_controller.instruments.variables import VARIABLES
+from tvist_protocol.pages import markdown_table
 from tvist_server.gateways.ur.rtde.variables import NAMED as NAMED_INPUTS
 from tvist_server.rtde.wire import WireType
 
@@ -41,16 +42,11 @@ def page() -> str:
         ]
         for side in ("output", "input")
     }
-    outputs = _table(
-        ("variable", "type", "source", "what"),
-        *((f"`{one.name}`", one.type, one.source, one.what) for one in VARIABLES.values()),
-        *((name, wire, "io", what) for side in registers.values() for name, wire, what in side),
-    )
-    inputs = _table(
-        ("variable", "type", "what"),
-        *((f"`{name}`", wire.name, what) for name, (wire, what) in NAMED_INPUTS.items()),
-        *registers["input"],
-    )
+    named = [(f"`{one.name}`", one.type, one.source, one.what) for one in VARIABLES.values()]
+    numbered = [(name, wire, "io", what) for side in registers.values() for name, wire, what in side]
+    outputs = markdown_table(("variable", "type", "source", "what"), [*named, *numbered])
+    given = [(f"`{name}`", wire.name, what) for name, (wire, what) in NAMED_INPUTS.items()]
+    inputs = markdown_table(("variable", "type", "what"), [*given, *registers["input"]])
     return f"""{HEAD}
 ## Outputs
 
@@ -69,11 +65,6 @@ changed.
 def describe(name: str) -> str:
     """Return the description of an output variable; empty if there is none of this name."""
     return VARIABLES[name].what if name in VARIABLES else ""
-
-
-def _table(head: tuple[str, ...], *rows: tuple[str, ...]) -> str:
-    lines = [head, ("---",) * len(head), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
 if __name__ == "__main__":
