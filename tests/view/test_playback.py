@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.conformance.served import finished
-from tests.system.conftest import called  # noqa: F401  a fixture
 
 from tvist_view.playback import playback, said
 from tvist_view.track import Track, TrackError
@@ -53,7 +52,7 @@ def test_command_writes_a_page(tmp_path):
         (("--port", "70000"), 1, "port is 70000: must be 0 to 65535"),
     ],
 )
-def test_misuse_is_refused_in_one_line(called, arguments, code, says, monkeypatch):  # noqa: F811
+def test_misuse_is_refused_in_one_line(called, arguments, code, says, monkeypatch):
     monkeypatch.setattr("os.nice", lambda _: None)  # the priority is that of the tests
     called("view", *arguments).assert_failed(code, says)
 
