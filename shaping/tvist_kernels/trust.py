@@ -13,7 +13,7 @@ class DistrustError(OSError):
 
 
 def real_folder(folder: Path) -> Path:
-    """Resolve a folder, which need not exist yet; check that nobody else can put files in it, now or later.
+    """Resolve a folder, which need not exist yet; check that other users can never put files in it.
 
     Folders are checked from the root down. If nobody else can write in a folder, nobody else can replace the
     folders below it after the check. In a sticky folder, such as /tmp, everybody can write, but nobody can

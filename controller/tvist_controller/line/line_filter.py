@@ -27,7 +27,7 @@ class LineFilter:
 
     @property
     def settled(self) -> bool:
-        """Whether the output stays at the reference, not just momentarily as negative weights allow."""
+        """True if the output rests at the reference; with negative weights it may also pass there."""
         return self._fade is None and (self.tvist.peak == 1.0 or self.tvist.settled)
 
     @property

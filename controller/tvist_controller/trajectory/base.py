@@ -155,7 +155,7 @@ class Trajectory(ABC):
 
     @property
     def standing(self) -> bool:
-        """Whether samples stay equal until a command comes: the trajectory has finished or is paused."""
+        """True if the reference rests until the next command: the trajectory has finished or is paused."""
         return self.finished
 
     @property

@@ -130,7 +130,7 @@ class ConstantModes(SampleMethod):
         return self.f_d is None and not self.for_payload
 
     def stepper(self, task: Task) -> RunningFilter:
-        """Return the fixed filter, reset; if it is designed for the target, it is told the target."""
+        """Return the fixed filter, reset; a filter that is designed for the target gets it first."""
         made, description, mass = shaper(self.shaper), task.description, task.move.mass
         designed = (self.f_d, self.zeta)
         if self.for_payload:
