@@ -135,5 +135,6 @@ def custom(
         check_mode(f_d, zeta, zeta_max)
         return Impulses(train.A, train.tau / f_d)
 
-    what, peak = description or "impulses of your own", max(float(np.abs(train.A).sum()), 1.0)
+    what = description or "impulses of your own"
+    peak = max(float(np.abs(train.A).sum()), 1.0)
     return Shaper(name, what, function, train.duration, zeta_max, peak)

@@ -133,12 +133,14 @@ def assert_within_limits(
                     (f"joint {joint}: angle [rad]", figure(row.q[joint]), bounds, f"{row.time:.3f}")
                 )
         for what, quantity, limits in rules:
-            value, at = max((abs(getattr(row, quantity)[joint]), -row.time) for row in rows)
-            if value > limits[joint]:
-                beyond.append((f"joint {joint}: {what}", figure(value), figure(limits[joint]), f"{-at:.3f}"))
-    fastest, at = max((math.hypot(*row.tool_speed[:3]), -row.time) for row in rows)
-    if tool_speed is not None and fastest > tool_speed:
-        beyond.append(("tool: speed [m/s]", figure(fastest), figure(tool_speed), f"{-at:.3f}"))
+            values = [abs(getattr(row, quantity)[joint]) for row in rows]
+            if (value := max(values)) > limits[joint]:
+                at = rows[values.index(value)].time
+                beyond.append((f"joint {joint}: {what}", figure(value), figure(limits[joint]), f"{at:.3f}"))
+    speeds = [math.hypot(*row.tool_speed[:3]) for row in rows]
+    if tool_speed is not None and (fastest := max(speeds)) > tool_speed:
+        at = rows[speeds.index(fastest)].time
+        beyond.append(("tool: speed [m/s]", figure(fastest), figure(tool_speed), f"{at:.3f}"))
     if beyond:
         raise AssertionError(
             f"{robot.name} was beyond its limits\n" + table(("what", "largest", "limit", "at [s]"), beyond)

@@ -78,7 +78,10 @@ def _program(io: Io | None) -> str:
 
 def _word(kind: type[RobotMode] | type[SafetyMode], number: int) -> str:
     """Return the name of a mode; its number if a newer server sent it."""
-    return kind(number).name if number in set(kind) else str(number)
+    try:
+        return kind(number).name
+    except ValueError:
+        return str(number)
 
 
 class ObservedArm:

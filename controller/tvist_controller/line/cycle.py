@@ -111,10 +111,10 @@ class ControlCycle:
             return self._stopped(guard, guard.give_up(str(error)))
         x_star = self.filter.filter(x) if self.mode.shaped else x
         # Check after the filter, since the arm must be able to stop from the shaped reference.
-        if not self.mode.guarded or guard is None:
-            return x, x_star, None
-        if (stop := guard(self.shaped.joints.after(x_star))) is not None:
-            return self._stopped(guard, stop)
+        if self.mode.guarded and guard is not None:
+            stop = guard(self.shaped.joints.after(x_star))
+            if stop is not None:
+                return self._stopped(guard, stop)
         return x, x_star, None
 
     def _stopped(self, guard: Guard, stop: Trajectory) -> tuple[Floats, Floats, Obstacle]:
@@ -201,7 +201,7 @@ class ControlCycle:
 
     @property
     def stands_still(self) -> bool:
-        """Whether the shaped reference rests at a still reference: the motion is over or paused."""
+        """True if reference and shaped reference rest: the motion is over or paused."""
         sample = self.sample
         return (
             self.trajectory.standing

@@ -162,7 +162,8 @@ class StopTorque:
         gravity = dynamics.gravities(q)
         motion = torque - gravity
         begun = np.abs(torque + REBOUND * (motion - self._before))
-        within &= (np.maximum(begun, np.abs(gravity - REBOUND * motion)) <= self._most).all(axis=1)
+        ended = np.abs(gravity - REBOUND * motion)
+        within &= (np.maximum(begun, ended) <= self._most).all(axis=1)
         return within
 
 

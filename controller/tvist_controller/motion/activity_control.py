@@ -269,10 +269,11 @@ class MotionControl:
         if sample.refused is not None and interrupted is not None:
             self.activity = interrupted
             self.tell_end(None, *sample.refused)
-        target = after(self.activity, "at_rest") if self._moving and self.cycle.mode.at_rest else None
-        if target is not None and not (self.activity is Activity.MOVING and self.motions.go_on()):
-            self.activity = target
-            self.motions.done()
+        if self._moving and self.cycle.mode.at_rest and (target := after(self.activity, "at_rest")):
+            goes_on = self.activity is Activity.MOVING and self.motions.go_on()
+            if not goes_on:
+                self.activity = target
+                self.motions.done()
         return sample
 
     def note(self, sample: Sample) -> None:

@@ -111,7 +111,8 @@ class RunningMove:
         newest = cycle.along.newest
         speed = max(trajectory.velocity, float(np.abs(newest.qd).max()))
         left = trajectory.path.end - newest.q
-        way = left * min(speed * speed / (most * max(float(np.abs(left).max()), STILL)), 1.0)
+        farthest = float(np.abs(left).max())
+        way = left * min(speed * speed / (most * max(farthest, STILL)), 1.0)
         limits = np.array(cycle.description.limits.torque)
         room = PAUSE_SHARE * acceleration_on_way(
             cycle.dynamics, trajectory.path, newest.q, way, speed, limits

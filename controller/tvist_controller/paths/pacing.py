@@ -166,7 +166,8 @@ def ground_of(run: Run, curve: SplineCurve, start: float = 0.0) -> PathLimits:
     starts = start + np.concatenate(([0.0], np.cumsum([piece.knots.s[-1] for piece in run])))
     edges, tool = [np.array([start])], []
     for piece, (here, end) in zip(run, pairwise(starts.tolist()), strict=True):
-        places = np.linspace(0.0, end - here, max(int(np.ceil((end - here) / largest)), 2) + 1)
+        cells = max(int(np.ceil((end - here) / largest)), 2)
+        places = np.linspace(0.0, end - here, cells + 1)
         edges.append(here + places[1:])
         along, bent = _joints(curve, here + places) if piece.by_joints else _tool(piece, places)
         pacing = piece.pacing
@@ -204,7 +205,8 @@ def _looks(places: Floats) -> Floats:
 
 def _largest(values: Floats) -> Floats:
     """Return bounds for each cell of values sampled at `_looks`, shape (c, m)."""
-    return np.asarray(MARGIN * np.maximum(np.maximum(values[:-1:2], values[2::2]), values[1::2]))
+    ends = np.maximum(values[:-1:2], values[2::2])
+    return np.asarray(MARGIN * np.maximum(ends, values[1::2]))
 
 
 def timed(pacing: LegSpeed, length: float) -> LegSpeed:

@@ -238,7 +238,8 @@ def _rounding(leg: Leg, start: ToolState, end: ToolState, *, drawn_out: bool) ->
         return 1.0
     if drawn_out:
         return float((chord / away) ** (2.0 / 3.0))
-    return float(0.625 * max(2.0 * chord / away, SHARPEST) ** 0.55)
+    ratio = max(2.0 * chord / away, SHARPEST)
+    return float(0.625 * ratio**0.55)
 
 
 def _joints(leg: Leg, s: float, tracker: Tracker, *, from_end: bool) -> tuple[Floats, Floats, Floats]:

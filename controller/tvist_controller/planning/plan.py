@@ -96,7 +96,8 @@ class Plans:
 
     def hold(self, plan: Plan) -> bool:
         """Return whether a plan is still valid in the present state."""
-        now = self._snapshot(0.0 if plan.state.get("after") is not None else None)
+        goes_on = plan.state.get("after") is not None
+        now = self._snapshot(0.0 if goes_on else None)
         return plan.until >= now.until and all(
             _same(value, getattr(now, name)) for name, value in plan.state.items()
         )

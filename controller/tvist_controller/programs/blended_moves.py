@@ -89,7 +89,7 @@ class BlendedMoves:
         self._extension: tuple[Callable[[], Plan], int, int] | None = None
         """Ordered plan of an extension, tick at which it applies, and number of moves."""
         self._final = self._refuses = False
-        """Whether the running motion cannot be extended; whether because a further move is impossible."""
+        """Nothing can extend the motion under way; the next move is impossible."""
         self._count = 0  # number of moves of the running motion
 
     # ------------------------------------------------------------------ for the program
@@ -265,8 +265,12 @@ class BlendedMoves:
 
 def command_of(legs: list[Segment], *, goes_on: bool = False) -> MoveJ | MoveL | MovePath:
     """Return the simplest command for moves blended into one motion; only a path can be extended."""
-    first = legs[0]
-    if goes_on or len(legs) > 1 or not isinstance(first, JointSegment | LineSegment):
+    if goes_on or len(legs) > 1:
         return MovePath(token=OWN_TOKEN, segments=tuple(legs))
-    fields = {name: value for name, value in asdict(first).items() if name != "blend"}
-    return (MoveJ if isinstance(first, JointSegment) else MoveL)(token=OWN_TOKEN, **fields)
+    fields = {name: value for name, value in asdict(legs[0]).items() if name != "blend"}
+    match legs[0]:
+        case JointSegment():
+            return MoveJ(token=OWN_TOKEN, **fields)
+        case LineSegment():
+            return MoveL(token=OWN_TOKEN, **fields)
+    return MovePath(token=OWN_TOKEN, segments=tuple(legs))

@@ -59,7 +59,8 @@ def compliant_velocity(task: ForceTask, velocity: Floats, felt: Floats) -> Float
     moved = (velocity + PERIOD * push) / (1.0 + PERIOD * damping / task.mass)
     moved = np.clip(moved, -task.limits, task.limits)
     most = PERIOD * np.repeat(RELEASE, 3)
-    return np.where(task.compliant > 0.0, moved, velocity - np.clip(velocity, -most, most))
+    released = velocity - np.clip(velocity, -most, most)
+    return np.where(task.compliant > 0.0, moved, released)
 
 
 class Compliant(LimitedFollower):
@@ -192,7 +193,8 @@ class Compliant(LimitedFollower):
         off = np.concatenate((self._pose[1] - position, turn(rotation, self._pose[0])))
         lost = np.where(self.task.compliant > 0.0, _into(axes, off), 0.0)
         self._pose = self._shifted(self._pose, -_out(axes, lost))
-        self._given = _out(axes, np.where(self.task.compliant > 0.0, 0.0, _into(axes, self._given)))
+        kept = np.where(self.task.compliant > 0.0, 0.0, _into(axes, self._given))
+        self._given = _out(axes, kept)
 
 
 def _into(axes: Floats, base: Floats) -> Floats:

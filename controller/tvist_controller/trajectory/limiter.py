@@ -211,9 +211,11 @@ class Limiter:
         # Shortest stop from zero acceleration, plus or minus the distance between its start and the present state.
         top = speed + 0.5 * jerk * ramp**2
         gentle = top < limit**2 / jerk
-        stop = top * np.where(gentle, np.sqrt(top / jerk), 0.5 * (top / limit + limit / jerk))
+        swing = top / limit + limit / jerk
+        stop = top * np.where(gentle, np.sqrt(top / jerk), 0.5 * swing)
         rising = speed * ramp + jerk * ramp**3 / 3.0
-        way = stop + np.where(rise > 0.0, rising, -(top * ramp - jerk * ramp**3 / 6.0))
+        falling = top * ramp - jerk * ramp**3 / 6.0
+        way = stop + np.where(rise > 0.0, rising, -falling)
         way = np.where((rise < 0.0) & (speed <= 0.5 * jerk * ramp**2), speed * ramp, way)
         inside: Bools = sign * q + way + 2.0 * PERIOD * speed <= self._reach
         inside |= sign * q <= sign * self.q

@@ -227,9 +227,11 @@ class Ring:
         weights, *_ = np.linalg.lstsq(self.basis(parameters), self.alpha)
         left = self.unexplained(parameters)
         errors = self._standard_errors(parameters, left, weights.size).reshape(-1, 2)
-        sizes = np.linalg.norm(weights[: parameters.size].reshape(len(errors), 2, -1), ord=2, axis=(1, 2))
-        numbers = np.column_stack([parameters.reshape(-1, 2), sizes, errors])
-        return [Mode(*row) for row in numbers.tolist()], left.reshape(self.alpha.shape)
+        modes = []
+        for k, (f_d, zeta) in enumerate(parameters.reshape(-1, 2).tolist()):
+            amplitude = float(np.linalg.norm(weights[2 * k : 2 * k + 2], ord=2))
+            modes.append(Mode(f_d, zeta, amplitude, float(errors[k, 0]), float(errors[k, 1])))
+        return modes, left.reshape(self.alpha.shape)
 
     def _judge(self, parameters: Floats) -> RingDown:
         """Return the strongest mode with its standard errors, `ok` if they are small enough."""

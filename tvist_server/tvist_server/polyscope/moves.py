@@ -117,7 +117,9 @@ class Moves:
                 duration = f", t={_number(value)}"
             else:
                 raise UnknownPartError(f"a waypoint's {name}")
-        self._text.label(node, self._name(node), *filter(None, [style.tcp]))
+        self._text.label(node, self._name(node))
+        if style.tcp:
+            self._text.line(style.tcp)
         if near and place != near:
             place = f"pose_trans({place}, get_tcp_offset())" if style.flange else place
             place = f"get_inverse_kin({place}, qnear={near})" if style.kind == "MoveJ" else place
