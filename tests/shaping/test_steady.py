@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 from tvist_shaping import SHAPERS, Estimator, Fade, Fixed, TvistFilter, product, residual, zv
 from tvist_shaping.fir import FirDesign
 from tvist_shaping.impulse_train import Impulses
+from tvist_shaping.named import AIMED, DESIGNS
 from tvist_shaping.steady import ProductDesign, ShortDesign, SteadyFilter
 from tvist_shaping.taps import average, length, mean_delay, product_taps
 
@@ -275,3 +276,16 @@ def test_three_running_means_are_a_convolution_with_three_boxes(ticks, seed):
         average(vector, past, sums, i % ticks, out)
         end = kernel.size + i + 1
         np.testing.assert_allclose(out, kernel[::-1] @ padded[end - kernel.size : end], atol=1e-13)
+
+
+def test_shaper_for_a_known_end_leaves_its_three_lowest_modes_at_rest():
+    f_d, zeta = (
+        np.array([5.0, 12.5, 25.0, 35.0]),
+        np.array([0.3, 0.1, 0.05, 0.05]),
+    )  # half periods are whole ticks
+    design = DESIGNS[AIMED](1.0)
+    taps = np.empty(design.taps)
+    design.at_target(f_d, zeta, taps)
+    impulses = Impulses(taps, H * np.arange(design.taps))
+    for f, z in zip(f_d[:3], zeta[:3], strict=True):
+        assert residual(f, z, impulses) < 1e-9
