@@ -300,7 +300,7 @@ class SimulatedArm(Plant):
 
 
 class RealArm(Plant):
-    """Plant that cannot be placed. Its own controller (`cycle_report`) or tvist (`latest_report`) may move it."""
+    """Plant that cannot be placed. Its controller (`cycle_report`) or tvist (`latest_report`) moves it."""
 
     def measure(self) -> Measurement:
         """Return the present measurements without moving the arm.

@@ -86,8 +86,8 @@ class Fitter:
         """Plan a motion; while it exceeds a limit, plan it again more slowly.
 
         Near a limit, the motion is shaped in advance by the filter from `tvist`. With None, to save time, the
-        filter's `surplus` is kept free instead. `limits` are the requested ones; None if something else sets
-        the speed.
+        filter's `excess_at_limits` is kept free instead. `limits` are the requested ones; None if something
+        else sets the speed.
         """
         asked, need, slower = make(AS_ASKED), None, AS_ASKED
         motion = asked
@@ -119,9 +119,9 @@ class Fitter:
     def _need(
         self, motion: PlannedMotion, now: PlanningState, tvist: Callable[[], Filter] | None
     ) -> Need | None:
-        """Return how much to slow a motion: by a bound with the filter surplus or, if too much, as shaped."""
+        """Return how much to slow a motion: by a bound with `excess_at_limits` or, if too much, as shaped."""
         q, qd, qdd = _states(motion)
-        faster, harder = (1.0 + more for more in now.surplus)
+        faster, harder = (1.0 + more for more in now.excess_at_limits)
         qd, qdd = faster * qd, harder * qdd
         found = self._exceeded(q, qd, qdd, qd, now, BLUNTED)
         ahead = None if found is None or tvist is None else shaped_ahead(motion, tvist())
@@ -156,8 +156,8 @@ class Fitter:
         """Return how much slower a motion must be for torques: in acceleration, velocity or both."""
         dynamics, limits, factors = self._dynamics, self._torque, [1.0, 1.0]
         worst, need = 1.0, None
-        for believed in now.bodies:
-            dynamics.believe((believed,))
+        for parameters in now.bodies:
+            dynamics.use_bodies((parameters,))
             gravity = dynamics.gravities(q)
             moving = blunted * (dynamics.torques(q, qd, qdd) - gravity)
             effort = np.abs(gravity + moving)

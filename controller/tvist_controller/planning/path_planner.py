@@ -120,9 +120,10 @@ class PathPlanner:
         law = fitted.motion.law
         assert isinstance(law, RetimedLaw)
         told, count = _told(fitted, run, branch.s), before.segments + count
-        course = None if coming else _course(run, route, curve, ground, law, count, delay, branch.s)
+        extendable = None if coming else _extendable(run, route, curve, ground, law, count, delay, branch.s)
         velocity = fastest(law, curve)
-        moves = [PlannedMove((fitted.motion,), velocity, told, window=delay, peak=tvist.peak, course=course)]
+        planned = PlannedMove((fitted.motion,), velocity, told, window=delay, peak=tvist.peak)
+        moves = [planned._replace(extendable=extendable)]
         for further in coming:
             move = self._along(further, route, jerk, tvist, now, count)
             self._check_clear(move.parts[0].path.whole, further, (0.0, length_of(further)), now)
@@ -181,9 +182,10 @@ class PathPlanner:
         fitted = self._moves.fit(make, now, lambda: self._filters.like(now.filter))
         kept, last = fitted.motion.law, run is route.runs[-1]
         assert isinstance(kept, RetimedLaw)
-        course = _course(run, route, curve, ground, kept, count, delay) if last else None
+        extendable = _extendable(run, route, curve, ground, kept, count, delay) if last else None
         velocity, told = highest * fitted.slower.rate, _told(fitted, run) or slower
-        return PlannedMove((fitted.motion,), velocity, told, window=delay, peak=tvist.peak, course=course)
+        planned = PlannedMove((fitted.motion,), velocity, told, window=delay, peak=tvist.peak)
+        return planned._replace(extendable=extendable)
 
     def _curve(
         self, knots: Knots, run: Run, tvist: Filter, now: PlanningState
@@ -239,7 +241,7 @@ def _joined(
     )
 
 
-def _course(
+def _extendable(
     run: Run,  # the last one of the route
     route: Route,
     curve: SplineCurve,

@@ -240,7 +240,7 @@ class PoseFunctions(Family):
     @costs(280)
     def get_mass_matrix(self, q: Joints | None = None, include_rotors_inertia: object = True) -> Array:
         """Return the inertia matrix of the joints with the declared payload [kg m^2]."""
-        self._dynamics.believe(self._access.motion.cycle.dynamics.bodies)
+        self._dynamics.use_bodies(self._access.motion.cycle.dynamics.bodies)
         matrix = self._dynamics.inertia(self._posture(q))
         matrix = np.triu(matrix) + np.triu(matrix, 1).T
         if include_rotors_inertia:
