@@ -7,7 +7,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from tvist_shaping._types import Floats, Forked
+from tvist_shaping._types import Floats, Forkable
 from tvist_shaping.delay_line import DelayLine
 from tvist_shaping.errors import FilterError, ShaperFailureError, ShapingError, check_positive
 from tvist_shaping.estimators.base import Estimator
@@ -22,7 +22,7 @@ Posture = Callable[[Floats], Floats]
 """Function from a sample, shape (width,), to the joint angles that it represents, shape (joints,) [rad]."""
 
 
-class Filter(Forked, ABC):
+class Filter(Forkable, ABC):
     """Time-varying shaping of a sampled reference, one filter for all joints.
 
     A sample consists of the joint angles, or of the parameter of a path that the joints follow (see `reset`). In the

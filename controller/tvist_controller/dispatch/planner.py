@@ -4,10 +4,10 @@ from typing import Any
 
 from tvist_controller.dispatch.table import COMMANDS
 from tvist_controller.planning.filter_planner import FilterPlanner
+from tvist_controller.planning.kinematic_planner import KinematicPlanner
 from tvist_controller.planning.move_planner import MovePlanner
 from tvist_controller.planning.path_planner import PathPlanner
 from tvist_controller.planning.plan import Plan, PlanResult
-from tvist_controller.planning.reachable import Reachable
 from tvist_controller.planning.snapshot import FilterState, PlanningState
 from tvist_controller.programs.compiling import ScriptCompiler
 from tvist_controller.refusal import RefusalError
@@ -22,10 +22,10 @@ class Planner:
     def __init__(self, setup: Setup) -> None:
         self._description = setup.description
         self.filters = FilterPlanner(setup)
-        moves, reachable = MovePlanner(setup, self.filters), Reachable(setup.description)
+        moves, kinematic = MovePlanner(setup, self.filters), KinematicPlanner(setup.description)
         self._scripts = ScriptCompiler(setup.description)
-        paths = PathPlanner(setup, self.filters, moves, reachable)
-        planners = (self.filters, moves, paths, reachable, self._scripts)
+        paths = PathPlanner(setup, self.filters, moves, kinematic)
+        planners = (self.filters, moves, paths, kinematic, self._scripts)
         self._planners: dict[type, Any] = {type(one): one for one in planners}
 
     def rehearse_scripts(self) -> None:

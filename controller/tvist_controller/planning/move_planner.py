@@ -9,7 +9,7 @@ import numpy as np
 from tvist_controller.foresight.collision import CLEARANCE, CloseBodies, CollisionModel
 from tvist_controller.line.limits import arm_limits, rate_of
 from tvist_controller.planning.filter_planner import FilterPlanner
-from tvist_controller.planning.fitting import Fitter, Slower, keeping_motion
+from tvist_controller.planning.fitting import Fitter, SlowdownFactors, keeping_motion
 from tvist_controller.planning.slower import Limited, longer_joint_motion, slower_joint_motion
 from tvist_controller.planning.snapshot import ExtendableMotion, PlanningState
 from tvist_controller.refusal import RefusalError
@@ -64,7 +64,7 @@ class MovePlanner(Fitter):
             agility = at_least(limits, AGILE.acceleration, AGILE.jerk)
         rate = rate_of(now.speed, limits.velocity, now.slowest)
 
-        def make(slower: Slower) -> PlannedMotion:
+        def make(slower: SlowdownFactors) -> PlannedMotion:
             kept = replace(
                 limits,
                 velocity=limits.velocity * slower.velocity,

@@ -51,7 +51,7 @@ Order = Callable[[Command, PlanningState], Callable[[], Plan]]
 """Orders a plan on a state; returns a function that waits for it."""
 
 
-class MakesPlans(Protocol):
+class PlannerLike(Protocol):
     """Interface of `Planner`, which is in a higher layer than users of plans."""
 
     filters: FilterPlanner
