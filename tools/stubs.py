@@ -16,7 +16,7 @@ from cyclopts import run
 import tvist_client
 from tvist_client import blocking, commands
 from tvist_client.command import Answer, Sent
-from tvist_client.waiting import Attribute, Waited
+from tvist_client.waiting import Attribute, BlockingMethod
 from tvist_protocol.commands import Command
 
 PACKAGE = Path(tvist_client.__file__).parent
@@ -69,7 +69,7 @@ def _parts(kind: type) -> Iterator[tuple[str, str]]:
     bases = [f"{base.__module__}.{base.__qualname__}" for base in kind.__bases__ if base is not object]
     yield f"class {kind.__name__}({', '.join(bases)}):".replace("()", ""), kind.__doc__ or ""
     for name, member in vars(kind).items():
-        if isinstance(member, Sent | Waited):
+        if isinstance(member, Sent | BlockingMethod):
             signature = str(inspect.signature(member)).replace(
                 formatannotation(Answer), "tvist_client.command.Answer"
             )

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from tvist_cli.output import number, out, print_json, table
-from tvist_lab.identification.calibrate import Found, ModeErrors
+from tvist_lab.identification.calibrate import CalibrationResult, ModeErrors
 from tvist_lab.identification.jogs import Jog, RingDownLogs
 from tvist_lab.identification.payload import PayloadFound
 from tvist_lab.identification.ring_downs import CONTRADICTS, unused
@@ -38,7 +38,7 @@ FRICTION = {
 
 
 def report(
-    found: Found,
+    found: CalibrationResult,
     measured: RingDownLogs,
     output: Path,
     options: str,
@@ -156,7 +156,7 @@ def _lag(servo: ServoResponse | None, *, positions: bool) -> None:
         out.print("The robot does not follow set-points as a servo with a lag does: nothing compensates it.")
 
 
-def _wrong(found: Found) -> str:
+def _wrong(found: CalibrationResult) -> str:
     """Return a text that names the stops that contradict the others."""
     names = [f"{stop.log}, motion {stop.motion}" for stop in found.stops if stop.reason == CONTRADICTS]
     return f" ({'; '.join(names)}). Was the payload the declared one, and was the arm free?"

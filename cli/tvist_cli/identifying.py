@@ -17,7 +17,7 @@ from tvist_client.errors import MotionStoppedError
 from tvist_client.robot import Robot
 from tvist_controller.api.line import Setup, paper_payload
 from tvist_controller.setup import check_rating
-from tvist_lab.identification.calibrate import Found, ModeErrors, calibrate, true_errors
+from tvist_lab.identification.calibrate import CalibrationResult, ModeErrors, calibrate, true_errors
 from tvist_lab.identification.jogs import JogPlan, RingDownLogs, make_jogs, plan_jogs
 from tvist_lab.identification.payload import identify_payload
 from tvist_lab.identification.ring_downs import Log, Progress
@@ -74,7 +74,9 @@ def from_logs(
     report(found, measured, output, "" if named == ROBOT else f" --robot {named}", None, json=json)
 
 
-def _calibrated(arm: RobotDescription, measured: RingDownLogs, output: Path, step: Progress) -> Found:
+def _calibrated(
+    arm: RobotDescription, measured: RingDownLogs, output: Path, step: Progress
+) -> CalibrationResult:
     found = calibrate(arm, measured, name=output.stem, command=typed(), progress=step)
     write_whole(output, calibration_to_json(found.calibration))
     return found
@@ -224,7 +226,9 @@ def _robot_logs(
     return description, [Log(str(file), one, payload) for file, one in zip(files, recordings, strict=True)]
 
 
-def _figures(found: Found, arm: RobotDescription, true: list[ModeErrors] | None) -> "dict[str, Figure]":
+def _figures(
+    found: CalibrationResult, arm: RobotDescription, true: list[ModeErrors] | None
+) -> "dict[str, Figure]":
     """Draw the measured modes; if the truth is known, also maps of the lowest mode over the workspace."""
     from tvist_lab.figures import identified_figure, workspace_map_figure
     from tvist_lab.identification.workspace_map import QUANTITIES, workspace_map

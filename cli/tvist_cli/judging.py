@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
     from tvist_lab.recordings import Recording
     from tvist_protocol.stream import Truth
-    from tvist_view.beside import MotionRecord, Verdict
+    from tvist_view.request_handler import MotionRecord, Verdict
 
 LEAST_TRUTH_SHARE = 0.8
 """Share of ticks that must have a truth message for the truth to be used [-]; a busy machine loses some."""

@@ -22,9 +22,9 @@ from tvist_plant.plant import PERIOD
 from tvist_protocol.content import checked
 from tvist_protocol.values import Payload
 from tvist_view import described
-from tvist_view.beside import MotionRecord
 from tvist_view.look import Look
 from tvist_view.playback import playback, said
+from tvist_view.request_handler import MotionRecord
 from tvist_view.track import Track
 
 LEAD = 150  # ticks at rest shown before a motion

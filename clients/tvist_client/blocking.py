@@ -8,7 +8,7 @@ A call waits for its answer; Ctrl-C ends the wait. Callbacks run in the loop's t
 """
 
 from tvist_client import arm, motion, robot, servo
-from tvist_client.waiting import Opened, Stream, without_await
+from tvist_client.waiting import BlockingConnection, Stream, without_await
 
 __all__ = ["Arm", "Motion", "Robot", "Servo", "Stepper", "Stream"]
 
@@ -19,5 +19,5 @@ Arm = without_await(arm.Arm, "robot", "keep_alive_every")
 Robot = without_await(
     robot.Robot,
     *("arm", "stepper", "pass_time", "put_setpoint", "until", "watch"),
-    base=Opened,
+    base=BlockingConnection,
 )

@@ -6,7 +6,7 @@ from contextlib import AbstractContextManager
 from typing import Any, Literal, Self
 
 from tvist_client.command import Answer
-from tvist_client.waiting import Opened, Stream, Waiting
+from tvist_client.waiting import BlockingBase, BlockingConnection, Stream
 from tvist_protocol.commands import Command
 from tvist_protocol.info import Info
 from tvist_protocol.io import Io, Registers
@@ -17,7 +17,7 @@ from tvist_protocol.values import Payload
 
 __all__ = ["Arm", "Motion", "Robot", "Servo", "Stepper", "Stream"]
 
-class Motion(Waiting):
+class Motion(BlockingBase):
     id: int
     started: int | None
     done: int | None
@@ -26,18 +26,18 @@ class Motion(Waiting):
     ended: bool
     def wait(self) -> Self: ...
 
-class Servo(Waiting):
+class Servo(BlockingBase):
     period: float
     sequence: int
     def set(self, q: Iterable[float]) -> int: ...
     def step_through(self, qs: Iterable[Iterable[float]]) -> int: ...
 
-class Stepper(Waiting):
+class Stepper(BlockingBase):
     def step(self, ticks: int) -> int: ...
     def advance(self, ticks: int) -> int: ...
     token: str
 
-class Arm(Waiting):
+class Arm(BlockingBase):
     def servo(self, *, period: float = 0.002, velocity: float = 1.5, acceleration: float = 2.0,
         jerk: float = 100.0) -> AbstractContextManager[Servo]: ...
     def unlock_protective_stop(self) -> None: ...
@@ -104,7 +104,7 @@ class Arm(Waiting):
     def keep_alive(self) -> None: ...
     token: str
 
-class Robot(Opened):
+class Robot(BlockingConnection):
     def control(self, client: str, *, lease_s: float = 30.0) -> AbstractContextManager[Arm]: ...
     def clock_control(self, client: str) -> AbstractContextManager[Stepper]: ...
     def states(self, buffer: int = 5000) -> Stream[State]: ...

@@ -25,7 +25,7 @@ _ANSWER = re.compile(r"; (it is )?answered (as|by) [^.]*")
 """Part of a message's description that is about the answer; users get the method's result instead."""
 
 
-class Commanded(Protocol):
+class CommandSender(Protocol):
     """The methods of a robot that commands use."""
 
     motions: MotionsByNumber
@@ -46,7 +46,7 @@ class Commanded(Protocol):
 class Leased:
     """Control or the clock of a robot, a right that is proved by a token."""
 
-    robot: Commanded
+    robot: CommandSender
     token: str
     """Token of the right, sent with every command."""
 
@@ -131,7 +131,7 @@ def asking(kind: type[Struct], answer: type[Struct], positional: int | None = No
     """Return a method that sends a question and returns the only field of the answer."""
     (name,) = answer.__struct_fields__
 
-    async def ask(robot: Commanded, command: Command) -> Any:
+    async def ask(robot: CommandSender, command: Command) -> Any:
         reply = await robot.request(command)
         if not isinstance(reply, answer):
             raise UnexpectedReplyError(f"{tag(kind)} was answered by {reply}, without {name}")

@@ -20,13 +20,13 @@ from tvist_protocol.schema import field_docs
 M = TypeVar("M")
 
 
-class Waited(Described):
+class BlockingMethod(Described):
     """A blocking method, with the arguments and the description of the asynchronous method that it wraps."""
 
     def __init__(self, of: Any) -> None:
         self._of = of
 
-    def __call__(self, owner: "Waiting", *values: Any, **named: Any) -> Any:
+    def __call__(self, owner: "BlockingBase", *values: Any, **named: Any) -> Any:
         """Run the wrapped method on the loop, and wait for the result."""
         method, portal = getattr(owner._inner, self.__name__), owner._portal  # noqa: SLF001  its methods
         result = portal.call(lambda: method(*values, **named))
@@ -75,14 +75,14 @@ class Attribute:
 _TWINS: dict[Any, Any] = {}  # blocking classes, by their asynchronous ones
 
 
-class Waiting:
+class BlockingBase:
     """Base of the blocking classes."""
 
     def __init__(self, portal: Portal, inner: Any) -> None:
         self._portal, self._inner = portal, inner
 
 
-def without_await(of: type, *internal: str, base: type[Waiting] = Waiting) -> Any:
+def without_await(of: type, *internal: str, base: type[BlockingBase] = BlockingBase) -> Any:
     """Return the blocking counterpart of a class: its public members except those named in `internal`."""
     members: dict[str, Any] = {
         "__module__": "tvist_client.blocking",
@@ -91,12 +91,12 @@ def without_await(of: type, *internal: str, base: type[Waiting] = Waiting) -> An
     for name in dict.fromkeys(name for part in of.__mro__ for name in get_annotations(part) | vars(part)):
         if not (name.startswith("_") or name in internal or hasattr(base, name)):
             member = inspect.getattr_static(of, name, None)
-            members[name] = Waited(member) if callable(member) else Attribute(of, name)
+            members[name] = BlockingMethod(member) if callable(member) else Attribute(of, name)
     twin = _TWINS[of] = type(of.__name__, (base,), members)
     return twin
 
 
-class Stream(Waiting, Iterator[M], Generic[M]):
+class Stream(BlockingBase, Iterator[M], Generic[M]):
     """Messages as an iterator; see `tvist_client.Stream`."""
 
     @property
@@ -116,7 +116,7 @@ class Stream(Waiting, Iterator[M], Generic[M]):
 _TWINS[feed.Stream] = Stream
 
 
-class Opened(Waiting):
+class BlockingConnection(BlockingBase):
     """Opens and closes the connection to a robot."""
 
     @classmethod

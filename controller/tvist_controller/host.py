@@ -12,7 +12,7 @@ from tvist_controller.dispatch.rights import ControlHolders, is_holders, may_ste
 from tvist_controller.instruments.report import Sink
 from tvist_controller.motion.setpoints import Unreadable
 from tvist_controller.planning.plan import Plan
-from tvist_controller.programs.sockets import SocketNews, SocketPorts
+from tvist_controller.programs.sockets import SocketEvent, SocketPorts
 from tvist_controller.safety.payload_learning import PayloadLearning
 from tvist_plant.foreign import told
 from tvist_plant.user_file import named
@@ -205,7 +205,7 @@ class Host:
             power.end()
             self.tell_raised()
 
-    def _carry_out_orders(self) -> Sequence[SocketNews]:
+    def _carry_out_orders(self) -> Sequence[SocketEvent]:
         """Carry out socket orders of programs; return results that are known at once."""
         orders = self.controller.programs.sockets.orders
         if not orders:
@@ -214,7 +214,7 @@ class Host:
         orders.clear()
         return news
 
-    def socket(self, news: SocketNews) -> None:
+    def socket(self, news: SocketEvent) -> None:
         """Take news about a socket of a program."""
         number, change, data = news
         self._note(Entry(tick=self._next, kind="socket", socket=number, change=change, data=data or None))

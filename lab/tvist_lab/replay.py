@@ -14,7 +14,7 @@ from tvist_controller.api.robot import (
     OwnPlant,
     Presence,
     RecordedPlant,
-    SocketNews,
+    SocketEvent,
     Unreadable,
     load_plant,
 )
@@ -212,7 +212,7 @@ def _give(controller: Controller, entry: Entry, presence: Presence) -> None:
         case "missed":
             controller.counters.missed_ticks += entry.count or 0
         case "socket":
-            controller.programs.sockets.hear(SocketNews.of(entry))
+            controller.programs.sockets.hear(SocketEvent.of(entry))
         case "gripper":
             if controller.cell is None:
                 raise ReplayError(

@@ -17,7 +17,7 @@ from tvist_protocol.replies import CODE_MEANINGS
 from tvist_protocol.schema import components, field_docs
 from tvist_protocol.simulation import StepSetpoint
 from tvist_protocol.stream import EVENT_MEANINGS, Event, State, Telemetry, Truth
-from tvist_protocol.transitions import HAPPENINGS, Activity, Control, Stepping, diagram
+from tvist_protocol.transitions import OTHER_TRIGGERS, Activity, Control, Stepping, diagram
 from tvist_protocol.values import PATTERN_MEANINGS, Payload
 
 Schema = Mapping[str, Any]
@@ -155,7 +155,7 @@ def _tables() -> dict[str, str]:
         "control": diagram(Control),
         "stepping": diagram(Stepping),
         "happenings": markdown_table(
-            ("trigger", "meaning"), ((f"`{name}`", text) for name, text in HAPPENINGS.items())
+            ("trigger", "meaning"), ((f"`{name}`", text) for name, text in OTHER_TRIGGERS.items())
         ),
         "faults": markdown_table(
             ("fault", "meaning", "needs"),

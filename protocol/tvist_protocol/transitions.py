@@ -54,7 +54,7 @@ class Activity(StrEnum):
 class Transition:
     """Rows of the table that have the same trigger and the same target."""
 
-    trigger: str  # `type` of a command, or one of `HAPPENINGS`
+    trigger: str  # `type` of a command, or one of `OTHER_TRIGGERS`
     sources: tuple[StrEnum, ...]
     target: StrEnum
 
@@ -77,7 +77,7 @@ class Stepping(StrEnum):
     """Only the client that holds the clock."""
 
 
-HAPPENINGS: dict[str, str] = {
+OTHER_TRIGGERS: dict[str, str] = {
     "power": "`power_on` with `release_brakes` false",
     "at_rest": "the shaped reference has come to rest",
     "interruption": "the motion must end: the lease ended, no set-point came for 250 ms, or there would be a collision",

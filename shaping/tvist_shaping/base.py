@@ -7,7 +7,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from tvist_shaping._types import Floats, Forked
+from tvist_shaping._types import Floats, Forkable
 from tvist_shaping.delay_line import DelayLine
 from tvist_shaping.errors import FilterError, ShaperFailureError, ShapingError, check_positive
 from tvist_shaping.estimators.base import Estimator
@@ -22,7 +22,7 @@ Posture = Callable[[Floats], Floats]
 """Function from a sample, shape (width,), to the joint angles that it represents, shape (joints,) [rad]."""
 
 
-class Filter(Forked, ABC):
+class Filter(Forkable, ABC):
     """Time-varying shaping of a sampled reference, one filter for all joints.
 
     A sample consists of the joint angles, or of the parameter of a path that the joints follow (see `reset`). In the
@@ -40,8 +40,8 @@ class Filter(Forked, ABC):
             sum of their magnitudes, which is 1 if none is negative [-].
         excess: Share by which the shaped acceleration may exceed the reference's, if such a bound is known and small
             [-]. The generator of the reference can stay below its limit by this share.
-        surplus: Largest shares by which the shaped velocity and acceleration exceed those of a reference at the arm's
-            limits [-]. Only the caller, who knows the arm, can set them; see `mean_delay_of`.
+        excess_at_limits: Largest shares by which shaped velocity and acceleration exceed those of a reference at the
+            arm's limits [-]. Only the caller, who knows the arm, can set them; see `mean_delay_of`.
         clipped: Whether at the last tick a delay exceeded the buffer, or a mode the estimator's bounds.
         feed_forward: Feed-forward that the drives need for the filter to work as designed.
         fault: Why the shaper's function failed in its last call; None if it did not. A filter cannot stop abruptly
@@ -60,7 +60,7 @@ class Filter(Forked, ABC):
         check_positive(FilterError, "seconds", period=period)
         self.name, self.estimator = name, estimator
         self.joints, self.period, self.peak = joints, period, peak
-        self.excess, self.surplus, self.clipped = 0.0, (0.0, 0.0), False
+        self.excess, self.excess_at_limits, self.clipped = 0.0, (0.0, 0.0), False
         self.fault: str | None = None
         self.feed_forward: FeedForward = "rigid"
         self._line = DelayLine(joints, capacity)

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvist_kernels.compiling import compiled
-from tvist_shaping._types import Floats, Forked
+from tvist_shaping._types import Floats, Forkable
 from tvist_shaping.errors import DelayError, ShapingError
 
 _MARGIN = 3  # samples needed beyond a delay: two older ones for interpolation, and the newest with delay 0
@@ -61,7 +61,7 @@ def gather(buffer: Floats, newest: int, A: Floats, delays: Floats, first: Floats
     return -1
 
 
-class DelayLine(Forked):
+class DelayLine(Forkable):
     """The latest samples of a reference, which can be read at any fractional delay.
 
     Attributes:

@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tvist_kernels.compiling import compiled
-from tvist_shaping._types import Floats, Forked
+from tvist_shaping._types import Floats, Forkable
 from tvist_shaping.base import Filter
 from tvist_shaping.errors import FilterError, check_positive
 
@@ -159,7 +159,7 @@ def blend(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops 
     return s, (s - share) / period, slope
 
 
-class Fade(Forked):
+class Fade(Forkable):
     """Changes from one filter to another during a motion, and keeps the motion's limits meanwhile.
 
     As long as the reference keeps limits of velocity, acceleration and jerk, the output keeps those of velocity and

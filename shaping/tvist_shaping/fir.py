@@ -74,7 +74,7 @@ class FirDesign:
         return len(self.spread)
 
 
-class Programme(NamedTuple):
+class QuadraticProgramme(NamedTuple):
     """Quadratic programme of a design with R rows: requirements, latest solution, and working memory."""
 
     spread: Floats  # `spread` of `FirDesign`, shape (modes,)
@@ -88,7 +88,7 @@ class Programme(NamedTuple):
     hessian: Floats  # scratch, shape (R, R + 2)
 
     @classmethod
-    def of(cls, wanted: FirDesign, taps: int) -> "Programme":
+    def of(cls, wanted: FirDesign, taps: int) -> "QuadraticProgramme":
         """Create the programme of a design, without a solution."""
         R = 2 + 2 * sum(2 if spread > 0.0 else 1 for spread in wanted.spread)
         return cls(
@@ -102,14 +102,14 @@ class Programme(NamedTuple):
             hessian=np.zeros((R, R + 2)),
         )
 
-    def fork(self) -> "Programme":
+    def fork(self) -> "QuadraticProgramme":
         """Return a copy with the present solution."""
-        return Programme(*(part.copy() for part in self))
+        return QuadraticProgramme(*(part.copy() for part in self))
 
 
 @compiled
 def solve(  # noqa: C901, PLR0912, PLR0915 - one kernel: its branches are loops over rows and weights
-    f_d: Floats, zeta: Floats, length: float, mean: float, period: float, programme: Programme
+    f_d: Floats, zeta: Floats, length: float, mean: float, period: float, programme: QuadraticProgramme
 ) -> bool:
     """Compute the weights for given modes, length [s] and mean delay [s].
 

@@ -16,12 +16,12 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from tvist_shaping._types import Floats, Forked
+from tvist_shaping._types import Floats, Forkable
 from tvist_shaping.base import FeedForward, Filter
 from tvist_shaping.errors import FilterError, check_positive
 from tvist_shaping.estimators.base import Estimator
 from tvist_shaping.failures import FAILURES, failure
-from tvist_shaping.fir import EDGE, GAIN, QUICKEST, FirDesign, Programme, solve
+from tvist_shaping.fir import EDGE, GAIN, QUICKEST, FirDesign, QuadraticProgramme, solve
 from tvist_shaping.taps import average, length, product_taps
 
 DESIGN_TICKS = 4  # ticks between two designs
@@ -31,7 +31,7 @@ EXCESS = 0.005
 """Largest share by which shaped acceleration exceeded the reference's in random motions at the limits [-]."""
 
 
-class Design(Forked, ABC):
+class Design(Forkable, ABC):
     """Base class of designs, which compute taps from modes."""
 
     name: str
@@ -126,7 +126,7 @@ class ShortDesign(Design):
         self.name, self.modes, self.mean_delay = name, wanted.modes, mean_delay
         self.wanted, self.period = wanted, period
         self.taps = math.ceil(wanted.longest / period) + 1
-        self._programme = Programme.of(wanted, self.taps)
+        self._programme = QuadraticProgramme.of(wanted, self.taps)
         self._length, self._solved = 0.0, False
 
     def start(self, f_d: Floats, zeta: Floats, taps: Floats) -> bool:

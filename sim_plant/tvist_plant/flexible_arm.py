@@ -20,11 +20,11 @@ from tvist_plant.drives import (
     springs_and_dampers,
     static_twist,
 )
+from tvist_plant.external_forces import ExternalForces
 from tvist_plant.imperfections import STICTION, Imperfections, imperfect_model
 from tvist_plant.integrator import rows
 from tvist_plant.model import FlexibleModel, Floats
 from tvist_plant.modes import Modes, modes
-from tvist_plant.outside import Outside
 from tvist_plant.plant import PERIOD, Measurement, PlantError, PlantTruth, Response, SimulatedArm
 from tvist_plant.robot_checks import in_words
 from tvist_plant.sensors import Accelerometer, gear_phases
@@ -84,8 +84,8 @@ class FlexibleArm(SimulatedArm):
         """Build the models with this payload, and memory for the state."""
         self.payload, carried = payload, self._carries(payload)
         self._flexible: FlexibleModel = imperfect_model(self.description, carried, self._imperfections)
-        self._outside = Outside(self._flexible)
-        self.bodies = self._outside.bodies
+        self._external = ExternalForces(self._flexible)
+        self.bodies = self._external.bodies
         """Names of the bodies for `push_body`, from the base outwards.
 
         A link is named after its joint, the outer half of a bending link after its virtual joint about z, the
@@ -111,7 +111,7 @@ class FlexibleArm(SimulatedArm):
         """Put the arm at rest in static equilibrium under a command at zero velocity."""
         if payload is not None:
             self._load(payload)
-        self._outside.clear()
+        self._external.clear()
         self._joints = self._joints._replace(gear_phase=gear_phases(self.description.joints, seed))
         self._arm.joints[:] = self._joints
         self._accelerometer = Accelerometer(self.description.sensors.accelerometer_noise, seed)
@@ -145,19 +145,19 @@ class FlexibleArm(SimulatedArm):
 
     def step(self, command: DriveCommand) -> Measurement:
         """Move the arm by a period, in which drives' commands change linearly from the last to this one."""
-        if self._outside.rests:
+        if self._external.rests:
             out = np.empty(self._width)
             finite = tick(self.memory, command.q, command.qd, command.torque, out)
             return self._measured(out, finite)
         move(self.memory, command.q, command.qd, command.torque)
-        self._arm.pushed[:] = self._outside.generalized_force(self._q)
+        self._arm.pushed[:] = self._external.generalized_force(self._q)
         measured = self._evaluate()
         self._arm.pushed[:] = 0.0
         return measured
 
     def play(self, commands: Floats) -> Response:
         """Move the arm by many periods in one call."""
-        if not self._outside.rests:
+        if not self._external.rests:
             return super().play(commands)
         response = self._played(self.memory, commands)
         force = response.specific_force
@@ -189,7 +189,7 @@ class FlexibleArm(SimulatedArm):
         self.payload, model = payload, self._flexible.model
         self._flexible.carry(self._carries(payload))
         self._arm.chain[model.nv - 1, BODY:] = body_of(model, model.nv)
-        self._arm.pushed[:] = 0.0 if self._outside.rests else self._outside.generalized_force(self._q)
+        self._arm.pushed[:] = 0.0 if self._external.rests else self._external.generalized_force(self._q)
         evaluate(self.memory, np.empty(self._width))
         self._arm.pushed[:] = 0.0
         # The integrator extrapolates from the last two ticks, but their difference is a jump, not a trend.
@@ -197,7 +197,7 @@ class FlexibleArm(SimulatedArm):
 
     def push(self, torque: Floats) -> None:
         """Apply external link-side torques (n,) [N m] until changed or reset; raise ValueError if invalid."""
-        self._outside.push(torque)
+        self._external.push(torque)
 
     def push_body(
         self,
@@ -213,7 +213,7 @@ class FlexibleArm(SimulatedArm):
         frame, which is that of its joint or the flange. Raise ValueError for an unknown body or anything but
         three finite numbers.
         """
-        self._outside.push_body(body, force, moment, point)
+        self._external.push_body(body, force, moment, point)
 
     def make_nan(self) -> None:
         """Make the state NaN, a fault that the next step detects."""

@@ -8,7 +8,7 @@ from typing import Any, cast
 import numpy as np
 
 from tvist_plant.description import Payload
-from tvist_plant.plant import Condition, Measurement, Plant, PlantError, RealArm, Sight, SimulatedArm
+from tvist_plant.plant import Condition, Measurement, Plant, PlantError, RealArm, RobotReport, SimulatedArm
 from tvist_plant.user_file import named
 
 _MEASURING = ("step", "reset", "measure")
@@ -94,8 +94,8 @@ class _StandIn(Plant):
     def _check(self, name: str, answer: Any, joints: int) -> None:
         if name == "condition" and not isinstance(answer, Condition):
             raise TypeError(f"it is a {type(answer).__name__}: must be a Condition")
-        if name in {"sight", "seen"}:
-            check_sight(answer, joints)
+        if name in {"cycle_report", "latest_report"}:
+            check_report(answer, joints)
         if name in _MEASURING:
             check_measurement(answer, joints, self.plant)
             felt = () if answer.wrench is None else answer.wrench
@@ -141,17 +141,17 @@ def check_measurement(measured: Measurement, joints: int, plant: Plant) -> None:
             )
 
 
-def check_sight(sight: Sight, joints: int) -> None:
+def check_report(report: RobotReport, joints: int) -> None:
     """Check what a robot driven by its own controller reports; the ValueError names the field."""
-    felt, load = sight.measured, sight.payload
+    felt, load = report.measured, report.payload
     measured = np.concatenate((felt.q, felt.qd, felt.moment)).tolist()
     body = None if load is None else (load.mass, *load.com, *load.inertia)
     for name, said, count in (  # a finite sum means finite values; faster than numpy
-        ("target", np.ravel(sight.target).tolist(), 4 * joints), ("measured", measured, 3 * joints),
-        ("modes", sight.modes, 3), ("speed", (sight.speed,), 1), ("tick", (sight.tick,), 1),
-        ("tool", sight.tool, 6), ("force", sight.force, 6), ("payload", body, 10),
+        ("target", np.ravel(report.target).tolist(), 4 * joints), ("measured", measured, 3 * joints),
+        ("modes", report.modes, 3), ("speed", (report.speed,), 1), ("tick", (report.tick,), 1),
+        ("tool", report.tool, 6), ("force", report.force, 6), ("payload", body, 10),
     ):  # fmt: skip
         if said is not None and (len(said) != count or not math.isfinite(sum(said))):
             raise ValueError(f"{name} is {said}: must be {count} finite numbers")
-    if sight.slider is not None and not 0.0 <= sight.slider <= 1.0:
-        raise ValueError(f"slider is {sight.slider:g}: must be 0 to 1")
+    if report.slider is not None and not 0.0 <= report.slider <= 1.0:
+        raise ValueError(f"slider is {report.slider:g}: must be 0 to 1")

@@ -91,7 +91,7 @@ class Condition:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sight:
+class RobotReport:
     """One cycle's report of a robot that its own controller moves."""
 
     tick: int  # number of the control period on the robot's clock, increasing
@@ -193,12 +193,12 @@ class Plant(ABC):
 
     @property
     def watched(self) -> bool:
-        """Whether the arm's own controller moves the arm and tvist only watches; see `RealArm.sight`."""
+        """Whether the arm's own controller moves the arm and tvist only watches; see `RealArm.cycle_report`."""
         return False
 
     @property
     def supervised(self) -> bool:
-        """Whether tvist moves the arm through the arm's own controller; see `RealArm.seen`."""
+        """Whether tvist moves the arm through the arm's own controller; see `RealArm.latest_report`."""
         return False
 
     def truth(self) -> PlantTruth | None:
@@ -300,7 +300,7 @@ class SimulatedArm(Plant):
 
 
 class RealArm(Plant):
-    """Plant that cannot be placed. It may have a controller: watched (`sight`) or moved by tvist (`seen`)."""
+    """Plant that cannot be placed. Its controller (`cycle_report`) or tvist (`latest_report`) moves it."""
 
     def measure(self) -> Measurement:
         """Return the present measurements without moving the arm.
@@ -313,29 +313,29 @@ class RealArm(Plant):
     @property
     def watched(self) -> bool:
         """Whether the arm's own controller moves the arm: commands have no effect; `step` only measures."""
-        return self.can(RealArm.sight) and self.can(Plant.wait)
+        return self.can(RealArm.cycle_report) and self.can(Plant.wait)
 
     @property
     def supervised(self) -> bool:
         """Whether tvist moves the arm via the arm's own controller, which follows set-points and may stop."""
-        needed = (RealArm.seen, RealArm.described, Plant.wait, Plant.switch, Plant.stop)
+        needed = (RealArm.latest_report, RealArm.described, Plant.wait, Plant.switch, Plant.stop)
         return all(self.can(method) for method in needed)
 
-    def sight(self) -> Sight:
+    def cycle_report(self) -> RobotReport:
         """Return the report of the cycle that `wait` waited for.
 
         Raises:
             PlantError: There was no new report since the last call.
         """
-        self._lacks("sight")
+        self._lacks("cycle_report")
 
     def interval(self) -> float:
         """Return the interval at which the arm's cycles arrive [s]."""
         return PERIOD
 
-    def seen(self) -> Sight:
+    def latest_report(self) -> RobotReport:
         """Return the latest report, with the messages (`told`) since the last call."""
-        self._lacks("seen")
+        self._lacks("latest_report")
 
     def described(self) -> RobotDescription:
         """Return the robot file with limits no wider than the robot's own."""

@@ -111,7 +111,7 @@ def test_the_simulated_future_of_the_line_is_bit_equal_to_the_real_one(name):
     for moment in sorted(random.integers(2, 1100, 3)):
         while line.trajectory._ticks < moment and not line.at_rest and motion.rate == 1.0:
             line.step()
-        ahead = Stopper(line).foresee()
+        ahead = Stopper(line).simulate_until_rest()
         assert ahead is not None
         if moment > 800:
             break

@@ -13,7 +13,7 @@ from tvist_controller.sources.own_plants import OwnPlant
 from tvist_plant.description import Payload
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.foreign import called, told
-from tvist_plant.plant import PERIOD, Condition, Halt, Measurement, Plant, PlantError, Sight
+from tvist_plant.plant import PERIOD, Condition, Halt, Measurement, Plant, PlantError, RobotReport
 from tvist_protocol import commands as c
 from tvist_protocol.io import SetIo
 from tvist_protocol.modes import RobotMode, SafetyMode
@@ -306,13 +306,13 @@ class OtherController:
         self.sent = []
         still = Measurement(self.q, np.zeros(6), np.zeros(6), np.zeros(3))
         shaped = np.array([self.q, *np.zeros((3, 6))])
-        self.sight = Sight(0, still, shaped, (7, 1, 1), 1.0, 0, payload=self.payload, slider=1.0)
+        self.report = RobotReport(0, still, shaped, (7, 1, 1), 1.0, 0, payload=self.payload, slider=1.0)
 
     def described(self):
         return UR5E
 
-    def seen(self):
-        return self.sight
+    def latest_report(self):
+        return self.report
 
     def wait(self, timeout):  # noqa: ARG002
         return True
@@ -345,7 +345,7 @@ class OtherController:
         )
 
     def says(self, **changes):
-        self.sight = replace(self.sight, **changes)
+        self.report = replace(self.report, **changes)
 
 
 @pytest.fixture
@@ -411,7 +411,7 @@ def test_a_lease_expires_while_the_arm_controller_does_not_answer(arm, monkeypat
     def silent():
         raise PlantError("no answer")
 
-    monkeypatch.setattr(arm, "seen", silent)
+    monkeypatch.setattr(arm, "latest_report", silent)
     robot.tick(200)
     assert robot.controller.session.lease is None
     assert "lease_lost" in [event.kind for event in robot.events]

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tvist_controller.programs.sockets import Close, Expire, Open, Send, SocketNews, Taken, Wait, Waited
+from tvist_controller.programs.sockets import Close, Expire, Open, Send, SocketEvent, Taken, Wait, Waited
 from tvist_protocol.programs import ProgramLoad, ProgramPlay, ProgramRun, ProgramStop
 
 from .scripts import a_robot, failure, finish, playing, said, script, start
@@ -25,7 +25,7 @@ class Far:
         self._sockets.orders.clear()
 
     def tell(self, change, data=b"", number=1):
-        self._sockets.hear(SocketNews(number, change, data))
+        self._sockets.hear(SocketEvent(number, change, data))
 
     def of(self, kind):
         self.take()

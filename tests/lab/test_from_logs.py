@@ -168,8 +168,8 @@ def test_every_stop_is_used_or_has_a_reason(logs):
     stops, payloads = stops_of(logs)
     assert len(stops) == 7
     assert [payload.mass for payload in payloads] == [0.0, 2.5, 4.5]
-    assert all((stop.ringing is None) == bool(stop.reason) for stop in stops)
-    assert sum(stop.ringing is not None for stop in stops) >= 5
+    assert all((stop.ring_down is None) == bool(stop.reason) for stop in stops)
+    assert sum(stop.ring_down is not None for stop in stops) >= 5
 
 
 def test_shaped_and_quiet_stops_are_not_used(logs):

@@ -81,9 +81,9 @@ def rings(driven=(), softening=0.0, count=4):
     return arm, found
 
 
-def errors(arm, ringings):
-    fit, apart = fit_modal(arm, ringings), []
-    for ring in ringings:
+def errors(arm, ring_downs):
+    fit, apart = fit_modal(arm, ring_downs), []
+    for ring in ring_downs:
         mass = arm.mass(ring.q, 0)
         own, true = (describe(arm.drivetrain(p).poles(mass)[0][:1]) for p in (fit.logarithms, arm.guess))
         apart.append([abs(np.log(a[0] / b[0])) for a, b in zip(own, true, strict=True)])

@@ -8,8 +8,8 @@ from tests.lab.made_logs import damped
 from tvist_controller.setup import body, paper_payload
 from tvist_lab.metrics import SLOW_POLE, fit_ring_down
 from tvist_lab.metrics.agreed_modes import agreed_modes
+from tvist_lab.metrics.frequency_factor import BASES, FIRST, FrequencyFactorEstimator
 from tvist_lab.metrics.ring_down import SIGNIFICANT
-from tvist_lab.metrics.ring_listener import BASES, FIRST, RingListener
 from tvist_plant.description import load
 
 PERIOD = 0.002
@@ -224,14 +224,14 @@ FEW_BASES = BASES[::4]
 
 
 @pytest.fixture
-def listener(monkeypatch):
-    """A listener that tries five stiffnesses of the arm's base, of which the first is rigid."""
-    monkeypatch.setattr("tvist_lab.metrics.ring_listener.BASES", FEW_BASES)
-    return RingListener(ROBOT, PAYLOAD)
+def estimator(monkeypatch):
+    """An estimator that tries five stiffnesses of the arm's base, of which the first is rigid."""
+    monkeypatch.setattr("tvist_lab.metrics.frequency_factor.BASES", FEW_BASES)
+    return FrequencyFactorEstimator(ROBOT, PAYLOAD)
 
 
-def ring_down(listener, base, q, factor, amplitude, random):
-    f_d, zeta = listener._models[base].settle(q)
+def ring_down(estimator, base, q, factor, amplitude, random):
+    f_d, zeta = estimator._models[base].settle(q)
     time, alpha = 0.002 * np.arange(150)[:, None], [0.0, 0.0, 9.81] + 0.03 * random.normal(size=(150, 3))
     for f, z in zip(factor * f_d[:2], zeta[:2], strict=True):
         phases, shares = random.uniform(0, 6, 3), random.uniform(0.3, 1, 3)
@@ -244,37 +244,37 @@ def poses(random):
 
 
 @pytest.mark.parametrize("base", [0, 3])
-def test_frequency_factor_and_base_are_found(listener, base):
+def test_frequency_factor_and_base_are_found(estimator, base):
     random, first = np.random.default_rng(base), []
     for _ in range(FIRST):
         q = poses(random)
         assert not first
-        first = listener.study(ring_down(listener, base, q, 1.05, 0.8, random), q)
+        first = estimator.estimate(ring_down(estimator, base, q, 1.05, 0.8, random), q)
     assert len(first) >= FIRST - 2
-    assert listener._base == base
+    assert estimator._base == base
     later = []
     for _ in range(10):
         q = poses(random)
-        later += listener.study(ring_down(listener, base, q, 0.85, 0.8, random), q)
+        later += estimator.estimate(ring_down(estimator, base, q, 0.85, 0.8, random), q)
     values, errors = np.array(later).T
     assert np.median(values) == pytest.approx(np.log(0.85), abs=0.03)
     assert np.mean(np.abs(values - np.log(0.85)) < 3.0 * errors + 0.02) > 0.7
 
 
-def test_stop_without_vibration_gives_no_factor(listener):
+def test_stop_without_vibration_gives_no_factor(estimator):
     random, found = np.random.default_rng(1), []
     for _ in range(FIRST + 10):
         q = poses(random)
-        found += listener.study(ring_down(listener, 0, q, 1.0, 0.0, random), q)
+        found += estimator.estimate(ring_down(estimator, 0, q, 1.0, 0.0, random), q)
     assert len(found) <= 2
 
 
-def test_stop_with_missing_readings_is_ignored(listener):
+def test_stop_with_missing_readings_is_ignored(estimator):
     random, found = np.random.default_rng(2), []
     for stop in range(FIRST + 1):
         q = poses(random)
-        alpha = ring_down(listener, 3, q, 1.0, 0.8, random)
+        alpha = ring_down(estimator, 3, q, 1.0, 0.8, random)
         alpha[20, 0] = np.nan if stop == 0 else alpha[20, 0]
-        found += listener.study(alpha, q)
+        found += estimator.estimate(alpha, q)
     assert len(found) >= FIRST - 2
-    assert listener._base == 3
+    assert estimator._base == 3

@@ -211,12 +211,12 @@ class TestDishonesty:
             candidate.shaped(task)
 
     def test_method_that_gets_the_target_is_marked(self, ur5e, modal, task):
-        told = {one.name for one in some(names("bench"), ur5e, modal) if one.told_target}
+        told = {one.name for one in some(names("bench"), ur5e, modal) if one.needs_target}
         frozen = {"zv_frozen_at_end", "zv_3_modes_frozen_at_end"}
         assert told == {"auto-target", *frozen, "double_s_as_zv", "double_s_as_auto"}
 
         class Untold(Named):
-            told_target = False
+            needs_target = False
 
         aimed = Recipe("auto-target", modal)
         check_causal(Named(aimed, "auto-target", ""), task)

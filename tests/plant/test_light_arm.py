@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tvist_controller.api.line import respond
-from tvist_lab.metrics.ring_down import Ring
+from tvist_lab.metrics.ring_down import RingDownSignal
 from tvist_lab.study.line import RESTING, ControlLine
 from tvist_plant.description import Payload, load
 from tvist_plant.flexible_arm import FlexibleArm, combined
@@ -50,8 +50,8 @@ def ringing(name):
 def modes(alpha, begin, window, guesses):
     """Modes between two moments after the stop, as amplitude, f_d and damping ratio, the strongest first."""
     first = round(begin / 0.002)
-    ring = Ring(alpha[first:], 0.002 * np.arange(len(alpha) - first), 0.002, (0.0,)).cut(window)
-    found, _ = ring.modes_at(ring.refine(np.ravel([[f_d, 0.03] for f_d in guesses]))[1])
+    signal = RingDownSignal(alpha[first:], 0.002 * np.arange(len(alpha) - first), 0.002, (0.0,)).cut(window)
+    found, _ = signal.modes_at(signal.refine(np.ravel([[f_d, 0.03] for f_d in guesses]))[1])
     return sorted(((one.amplitude, one.f_d, one.zeta) for one in found), reverse=True)
 
 

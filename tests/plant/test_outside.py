@@ -5,10 +5,10 @@ import pinocchio as pin
 import pytest
 
 from tvist_plant.description import Payload
+from tvist_plant.external_forces import ExternalForces
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.imperfections import YieldingBase
 from tvist_plant.model import flexible_model
-from tvist_plant.outside import Outside
 
 from .arms import chain, quiet, rested, standing
 
@@ -34,7 +34,7 @@ def test_wrench_on_any_body_matches_pinocchio(joints):
     flexible = flexible_model(description, description.payload)
     q = np.random.default_rng(joints).uniform(-1.0, 1.0, flexible.model.nv)
     data = placed(flexible, q)
-    outside = Outside(flexible)
+    outside = ExternalForces(flexible)
     assert len(outside.bodies) == flexible.model.nv + 1
     for body in outside.bodies:
         outside.clear()
@@ -83,11 +83,11 @@ def test_push_ends_with_zeros_or_a_reset(arm):
     one.step(command)
     for body in ("flange", "elbow"):
         one.push_body(body)
-    assert one._outside.rests
+    assert one._external.rests
     one.push_body("flange", FORCE)
     one.push(np.ones(6))
     np.testing.assert_array_equal(one.reset(command).moment, rest.moment)
-    assert one._outside.rests
+    assert one._external.rests
 
 
 def test_yielding_base_can_be_pushed(arm):

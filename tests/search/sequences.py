@@ -142,7 +142,7 @@ class Sequence:
         path = cycle.trajectory.path
         if cycle.mode.at_rest or path is None or path.posture_of is not None:
             return None
-        ahead = motion.stopper.foresee()
+        ahead = motion.stopper.simulate_until_rest()
         return None if ahead is None else Undisturbed(ahead[1:], self.robot.controller.tick_number)
 
     def _tick(self, count):

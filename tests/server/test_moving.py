@@ -21,7 +21,7 @@ from tvist_controller.kinematics.arm import Arm
 from tvist_plant.description import Payload, load
 from tvist_plant.drives import DriveCommand
 from tvist_plant.foreign import called
-from tvist_plant.plant import PERIOD, Measurement, Sight
+from tvist_plant.plant import PERIOD, Measurement, RobotReport
 from tvist_protocol import commands as c
 from tvist_protocol.codec import decode, encode
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
@@ -55,7 +55,7 @@ from tvist_server.watching.connection import RtdeConnection
 from tvist_server.watching.variables import NEEDED, OPTIONAL
 
 Q = np.array([0.3, -1.2, 1.5, -1.8, -1.5, 0.2])
-GOOD = Sight(
+GOOD = RobotReport(
     1, Measurement(Q, np.zeros(6), np.zeros(6), np.zeros(3)), np.array([Q, *np.zeros((3, 6))]),
     (RobotMode.RUNNING, SafetyMode.NORMAL, RuntimeState.STOPPED), 1.0, 0,
     payload=Payload(mass=5.0), tool=(0.0, 0.0, 0.1, 0.0, 0.0, 0.0),

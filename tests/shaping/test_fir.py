@@ -33,7 +33,7 @@ class Programme:
         self.dual = np.zeros(2 + len(rows))
 
     def solve(self):
-        programme = fir.Programme.of(WANTED, N)
+        programme = fir.QuadraticProgramme.of(WANTED, N)
         programme.dual[:] = self.dual
         solved = solve(self.f_d, self.zeta, self.length, self.mean, H, programme)
         self.dual[:] = programme.dual

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tvist_cli.judging import judge
-from tvist_view.beside import MotionRecord
+from tvist_view.request_handler import MotionRecord
 
 
 def verdict(tracks, seed, share):

@@ -16,7 +16,7 @@ from tvist_controller.instruments.snapshot import Instruments
 from tvist_controller.kinematics.arm import Arm
 from tvist_controller.kinematics.inverse import InverseKinematics
 from tvist_controller.loopback import LoopbackHost
-from tvist_controller.paths.legs import JointWay, LegSpeed
+from tvist_controller.paths.legs import JointCurve, LegSpeed
 from tvist_controller.paths.pacing import JointLimits, ground_of, joined, law_of
 from tvist_controller.paths.route import Piece
 from tvist_controller.paths.tool_curves import PER_RADIAN, ToolLine
@@ -158,7 +158,7 @@ def _plans() -> None:
         InverseKinematics(description).solve(*Arm(description).pose(q), q)
     q, tracker = np.zeros(setup.description.joints), Tracker(setup.description, (0.0,) * 6)
     tracker.rates(q, ToolLine(*[tracker.pose(q)] * 2).at(0.0))
-    run = [Piece(JointWay(q, q + 0.1).part(0.0, 0.1 * PER_RADIAN), LegSpeed(1.0, 1.0), None, True, "")]
+    run = [Piece(JointCurve(q, q + 0.1).part(0.0, 0.1 * PER_RADIAN), LegSpeed(1.0, 1.0), None, True, "")]
     limits = setup.description.limits
     joints = JointLimits(np.array(limits.velocity), np.array(limits.acceleration), min(limits.jerk))
     curve = SplineCurve(joined(run))

@@ -14,7 +14,7 @@ from tvist_controller.host import Host
 from tvist_controller.instruments.report import Sink
 from tvist_controller.planning.plan import Plan
 from tvist_controller.planning.snapshot import PlanningState
-from tvist_controller.programs.sockets import SocketNews
+from tvist_controller.programs.sockets import SocketEvent
 from tvist_controller.safety.payload_learning import PayloadLearning, payload_learning_of
 from tvist_controller.setup import Setup
 from tvist_plant.plant import Plant, RealArm
@@ -222,7 +222,7 @@ class ServedRobot:
             processor_wait_us=self._waited_us - before,
         )
 
-    def _hear(self, news: SocketNews) -> None:
+    def _hear(self, news: SocketEvent) -> None:
         def hear() -> None:
             self.sockets.note(news)
             self.host.socket(news)

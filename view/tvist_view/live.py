@@ -4,9 +4,9 @@ import asyncio
 
 import msgspec
 
-from tvist_view import asked
-from tvist_view.beside import Judge
+from tvist_view import tab_messages
 from tvist_view.look import Meshes
+from tvist_view.request_handler import Judge
 from tvist_view.shown_robot import RobotPlace, ShownRobot, Watcher
 from tvist_view.stage import Tab, page
 
@@ -44,13 +44,13 @@ class LivePage:
         try:
             async for text in tab:
                 try:
-                    message = asked.read(text)
+                    message = tab_messages.read(text)
                 except msgspec.MsgspecError as error:
                     watcher.say(f"the page sent an invalid message: {error}")
                     continue
-                if isinstance(message, asked.Seen):
+                if isinstance(message, tab_messages.Seen):
                     watcher.free = True
-                elif not isinstance(message, asked.Show):
+                elif not isinstance(message, tab_messages.Show):
                     await shown.do(watcher, message)
                 elif message.name not in {self._first, *shown.robots}:
                     watcher.say(f"there is no robot {message.name}: choose one of {', '.join(shown.robots)}")

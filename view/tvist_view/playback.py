@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import Sequence
 from typing import Any
 
-from tvist_view.beside import Verdict
+from tvist_view.request_handler import Verdict
 from tvist_view.stage import Tab, page
 from tvist_view.track import Track
 

@@ -18,11 +18,11 @@ from tvist_protocol.info import Info
 from tvist_protocol.io import Io
 from tvist_protocol.modes import RobotMode
 from tvist_protocol.stream import Event
-from tvist_view import asked
-from tvist_view.beside import Doer, Judge
+from tvist_view import tab_messages
 from tvist_view.described import ObservedArm, described, state_in_words
 from tvist_view.look import GeometryError, Look, Meshes
 from tvist_view.pilot import Pilot
+from tvist_view.request_handler import Judge, RequestHandler
 from tvist_view.signals import LatestSignals, after_stop
 from tvist_view.stage import Tab
 
@@ -113,7 +113,7 @@ class ShownRobot:
         self._way = ObservedArm()
         self.watchers: set[Watcher] = set()
         self._ends: list[Callable[[], None]] = []
-        self._doer: Doer | None = None
+        self._handler: RequestHandler | None = None
         self._info: Info | None = None
         self._io: Io | None = None
         self._described: dict[str, Any] = {}
@@ -132,12 +132,12 @@ class ShownRobot:
         """Detach a tab: stop its motion and give its control back."""
         self.watchers.discard(watcher)
         watcher.robot = None
-        if self._doer is not None:
-            await self._doer.pilot.give_back(watcher.tab.number)
+        if self._handler is not None:
+            await self._handler.pilot.give_back(watcher.tab.number)
         if watcher.tasks:
             await asyncio.wait(watcher.tasks)
-            if self._doer is not None:  # a task may have taken control meanwhile
-                await self._doer.pilot.give_back(watcher.tab.number)
+            if self._handler is not None:  # a task may have taken control meanwhile
+                await self._handler.pilot.give_back(watcher.tab.number)
         self._listen()
 
     def _introduce(self, watcher: Watcher) -> None:
@@ -183,7 +183,7 @@ class ShownRobot:
         self._info, self._absent = info, ""
         self.running, self._way = LatestSignals(look), ObservedArm()
         pilot = Pilot(robot, f"view-{os.getpid()}", self._say)
-        self._doer = Doer(robot, look, pilot, self._judge, self._say, self._result)
+        self._handler = RequestHandler(robot, look, pilot, self._judge, self._say, self._result)
         self._described = described(info, look, self.robots, self._meshes)
         for watcher in self.watchers:
             self._introduce(watcher)
@@ -192,7 +192,7 @@ class ShownRobot:
             await self._ask(robot, pilot)
         finally:
             self._deaf()
-            self._doer = self.running = None
+            self._handler = self.running = None
             if pilot.holder is not None:
                 await pilot.give_back(pilot.holder)
 
@@ -200,8 +200,8 @@ class ShownRobot:
         """Subscribe to the robot while a tab shows it: servers compute the truth only for subscribers."""
         if not self.watchers:
             self._deaf()
-        elif self._doer is not None and self.running is not None and not self._ends:
-            robot, running = self._doer.robot, self.running
+        elif self._handler is not None and self.running is not None and not self._ends:
+            robot, running = self._handler.robot, self.running
             self._ends = [
                 robot.on_state(running.add),
                 robot.on_truth(running.add),
@@ -227,10 +227,10 @@ class ShownRobot:
 
     def status(self, tab: int) -> dict[str, Any] | None:
         """Return the content of a tab's status bar; None before the first state."""
-        info, doer, running = self._info, self._doer, self.running
-        if info is None or doer is None or running is None or running.state is None:
+        info, handler, running = self._info, self._handler, self.running
+        if info is None or handler is None or running is None or running.state is None:
             return None
-        pilot, only = doer.pilot, info.watched
+        pilot, only = handler.pilot, info.watched
         watched = f"{only} is only watched: this page cannot move or stop it."
         return {
             **state_in_words(running.state, info, self._io),
@@ -238,7 +238,7 @@ class ShownRobot:
             "mine": pilot.holder == tab,
             "free": only is None and pilot.holder is None and info.control in (None, pilot.client),
             "truth": running.has_truth,
-            "comparing": doer.comparing,
+            "comparing": handler.comparing,
             "only": "" if only is None else watched,
             "held": info.moved is None or info.robot_mode == RobotMode.RUNNING,
             "steps": self._way.steps(info, running.state, self._io),
@@ -261,17 +261,17 @@ class ShownRobot:
         for watcher in self.watchers:
             watcher.say(sentence)
 
-    async def do(self, watcher: Watcher, message: asked.Message) -> None:
+    async def do(self, watcher: Watcher, message: tab_messages.Message) -> None:
         """Carry out a tab's request."""
-        doer, info = self._doer, self._info
-        if doer is None or info is None:
+        handler, info = self._handler, self._info
+        if handler is None or info is None:
             watcher.say("there is no robot now")
-        elif isinstance(message, asked.Jog) and message.joint < len(info.joints):
-            doer.pilot.jog(watcher.tab.number, message.joint, message.direction)
+        elif isinstance(message, tab_messages.Jog) and message.joint < len(info.joints):
+            handler.pilot.jog(watcher.tab.number, message.joint, message.direction)
         else:
             if len(watcher.tasks) >= MOST_ASKED:
                 await asyncio.wait(watcher.tasks, return_when=asyncio.FIRST_COMPLETED)
-            task = asyncio.create_task(doer.do(info, watcher.tab.number, message))
+            task = asyncio.create_task(handler.do(info, watcher.tab.number, message))
             watcher.tasks.add(task)
             task.add_done_callback(watcher.tasks.discard)
             task.add_done_callback(self._finished)

@@ -8,7 +8,7 @@ from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.differentiator import STILL, central_differences
 from tvist_controller.line.elastic_feed_forward import ElasticFeedForward
 from tvist_controller.line.limits import REBOUND, TORQUE_SHARE, acceleration_on_way
-from tvist_controller.line.whole_motion import Driven, DrivenLine, respond
+from tvist_controller.line.whole_motion import DriveCommandSeries, DrivenLine, respond
 from tvist_controller.planning.filter_planner import choose_filter, wanted_modes
 from tvist_controller.planning.fitting import keeping_motion
 from tvist_controller.refusal import RefusalError
@@ -35,7 +35,7 @@ __all__ = [
     "Arm",
     "CollisionModel",
     "ControlCycle",
-    "Driven",
+    "DriveCommandSeries",
     "DrivenLine",
     "ElasticFeedForward",
     "InverseDynamics",

@@ -8,7 +8,7 @@ from tvist_controller.instruments.report import Sink, truth_of
 from tvist_controller.loopback import LoopbackHost
 from tvist_controller.motion.setpoints import Unreadable
 from tvist_controller.programs.compiling import ScriptCompiler
-from tvist_controller.programs.sockets import SocketNews
+from tvist_controller.programs.sockets import SocketEvent
 from tvist_controller.safety.payload_learning import payload_learning_of
 from tvist_controller.sources.own_plants import WORLD, OwnPlant, RecordedPlant, load_plant
 
@@ -22,7 +22,7 @@ __all__ = [
     "RecordedPlant",
     "ScriptCompiler",
     "Sink",
-    "SocketNews",
+    "SocketEvent",
     "Unreadable",
     "info_of",
     "load_plant",

@@ -4,10 +4,10 @@ from typing import Any
 
 from tvist_controller.dispatch.table import COMMANDS
 from tvist_controller.planning.filter_planner import FilterPlanner
+from tvist_controller.planning.kinematic_planner import KinematicPlanner
 from tvist_controller.planning.move_planner import MovePlanner
 from tvist_controller.planning.path_planner import PathPlanner
-from tvist_controller.planning.plan import Found, Plan
-from tvist_controller.planning.reachable import Reachable
+from tvist_controller.planning.plan import Plan, PlanResult
 from tvist_controller.planning.snapshot import FilterState, PlanningState
 from tvist_controller.programs.compiling import ScriptCompiler
 from tvist_controller.refusal import RefusalError
@@ -22,10 +22,10 @@ class Planner:
     def __init__(self, setup: Setup) -> None:
         self._description = setup.description
         self.filters = FilterPlanner(setup)
-        moves, reachable = MovePlanner(setup, self.filters), Reachable(setup.description)
+        moves, kinematic = MovePlanner(setup, self.filters), KinematicPlanner(setup.description)
         self._scripts = ScriptCompiler(setup.description)
-        paths = PathPlanner(setup, self.filters, moves, reachable)
-        planners = (self.filters, moves, paths, reachable, self._scripts)
+        paths = PathPlanner(setup, self.filters, moves, kinematic)
+        planners = (self.filters, moves, paths, kinematic, self._scripts)
         self._planners: dict[type, Any] = {type(one): one for one in planners}
 
     def rehearse_scripts(self) -> None:
@@ -34,7 +34,7 @@ class Planner:
 
     def for_lesson(self, lesson: PayloadLesson, present: FilterState) -> Plan:
         """Plan the present filter for a payload that the robot has learnt."""
-        found: Found | RefusalError
+        found: PlanResult | RefusalError
         try:
             found = self.filters.with_payload(lesson.payload, present)
         except RefusalError as refusal:
@@ -50,7 +50,7 @@ class Planner:
         assert planning is not None, "the command is carried out without a plan"
         possible = now.movable or "movable" not in planning.needs
         make = (within_tick and planning.within_tick) or planning.make
-        found: Found | RefusalError
+        found: PlanResult | RefusalError
         try:
             if row.check is not None and not checked:
                 row.check(command, self._description)

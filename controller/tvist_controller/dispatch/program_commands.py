@@ -3,7 +3,7 @@
 from tvist_controller.dispatch.robot import RobotParts
 from tvist_controller.planning.plan import CommandCall, CommandRow, Planning
 from tvist_controller.planning.snapshot import SCRIPT
-from tvist_controller.programs.compiling import Kept, ScriptCompiler
+from tvist_controller.programs.compiling import ScriptCompiler, StoredProgram
 from tvist_controller.refusal import RefusalError, out_of_turn, wrong_mode
 from tvist_protocol import programs as p
 from tvist_protocol.modes import RobotMode
@@ -21,8 +21,8 @@ _COMPILED_AFTER = Planning(
 def _load(robot: RobotParts, call: CommandCall[p.ProgramLoad]) -> None:
     name, script, kept = call.command.name, call.planned(), robot.programs.kept
     if call.command.text is not None:
-        kept.keep(name, Kept(script, call.origin))
-    loaded = kept.find(name) if script is None else Kept(script, call.origin)
+        kept.keep(name, StoredProgram(script, call.origin))
+    loaded = kept.find(name) if script is None else StoredProgram(script, call.origin)
     robot.programs.load(name, loaded, "another program was loaded")
 
 
@@ -34,7 +34,7 @@ def _run(robot: RobotParts, call: CommandCall[p.ProgramRun]) -> None:
     if script.secondary:
         robot.programs.play_beside(script, call.origin)
     else:
-        robot.programs.load(script.name, Kept(script, call.origin), "another program was started")
+        robot.programs.load(script.name, StoredProgram(script, call.origin), "another program was started")
         robot.programs.play(call.origin)
 
 

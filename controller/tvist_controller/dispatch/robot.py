@@ -21,7 +21,7 @@ from tvist_controller.motion.force_control import ForceControl
 from tvist_controller.motion.guidance import Guidance
 from tvist_controller.motion.monitors import Monitor, ShaperMonitor, TorqueOverload
 from tvist_controller.planning.filter_planner import FilterChoice
-from tvist_controller.planning.plan import MakesPlans, Order, Plan, Plans
+from tvist_controller.planning.plan import Order, Plan, PlannerLike, Plans
 from tvist_controller.planning.snapshot import PlanningState
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.player import ProgramPlayer
@@ -42,7 +42,7 @@ from tvist_protocol.values import Payload
 class RobotParts(ABC):
     """The parts of one robot, on which commands act; a `Controller` creates them."""
 
-    def __init__(self, setup: Setup, plant: Plant | None, planner: MakesPlans, order: Order | None) -> None:
+    def __init__(self, setup: Setup, plant: Plant | None, planner: PlannerLike, order: Order | None) -> None:
         self.setup = setup  # initial setup; if the arm cannot be placed, `q` is its measured initial posture
         self.tick_number = 0
         self.counters = Counters()

@@ -8,8 +8,8 @@ from tvist_controller.dispatch import motion_commands, program_commands
 from tvist_controller.dispatch.robot import RobotParts
 from tvist_controller.foresight.collision import CLEARANCE
 from tvist_controller.planning.filter_planner import FilterPlanner
+from tvist_controller.planning.kinematic_planner import KinematicPlanner
 from tvist_controller.planning.plan import CommandCall, CommandRow, Planning
-from tvist_controller.planning.reachable import Reachable
 from tvist_controller.planning.snapshot import FILTER, TOOL
 from tvist_controller.refusal import RefusalError, check_body, check_joints, invalid, wrong_mode
 from tvist_controller.safety.faults import check_fault
@@ -196,8 +196,13 @@ _SIMULATION = (
     ),
 )  # fmt: skip
 _QUESTIONS = tuple(
-    CommandRow(kind, lambda _, call: call.planned(), lease="none", plan=Planning(TOOL, Reachable, make))
-    for kind, make in ((InverseKinematics, Reachable.posture), (ForwardKinematics, Reachable.pose))
+    CommandRow(
+        kind, lambda _, call: call.planned(), lease="none", plan=Planning(TOOL, KinematicPlanner, make)
+    )
+    for kind, make in (
+        (InverseKinematics, KinematicPlanner.posture),
+        (ForwardKinematics, KinematicPlanner.pose),
+    )
 )
 
 COMMANDS: dict[type[c.Command], CommandRow] = {

@@ -162,7 +162,7 @@ class RemainingMotion:
         """Return time [s] and largest joint turn [rad] to rest, of `plan` if given; None if too far ahead."""
         if plan is not None:
             return plan.duration, plan.way
-        if (ahead := self._stopper.foresee()) is None:
+        if (ahead := self._stopper.simulate_until_rest()) is None:
             return None, None
         return max(resting_after(ahead) - 1, 0) * PERIOD, float(np.abs(ahead[-1] - ahead[1]).max())
 
@@ -170,7 +170,7 @@ class RemainingMotion:
         """Return bodies that come too close as a stream's final stop runs through the filter, else None."""
         if self._tail_is_spacious(end):
             return None
-        return self._on(self._stopper.foresee(trajectory=end))
+        return self._on(self._stopper.simulate_until_rest(trajectory=end))
 
     def rest_of_way(self, tvist: Filter | None, parts: Sequence[PlannedMotion]) -> CloseBodies | None:
         """Return bodies that get too close with a new filter in the rest of a motion (if unknown, a stop)."""
@@ -181,7 +181,7 @@ class RemainingMotion:
         trajectory = cycle.trajectory
         if (forecast := trajectory.forecast) is not None:
             return self._first([forecast.path.way(cycle.along.position, forecast.end), *coming])
-        if trajectory.foreseeable and (ahead := self._stopper.foresee(tvist)) is not None:
+        if trajectory.foreseeable and (ahead := self._stopper.simulate_until_rest(tvist)) is not None:
             return self._on(ahead)
         guard = self._guide_guard if cycle.guard is self._guide_guard else self._guard
         stop = self._stopper.stops.by_joints(cycle.newest, None, guard.clear)

@@ -27,7 +27,9 @@ class Stopper:
         self.stops = StopPlanner(cycle.description, cycle.dynamics)
         self._wanted = math.inf
 
-    def foresee(self, tvist: Filter | None = None, trajectory: Trajectory | None = None) -> Floats | None:
+    def simulate_until_rest(
+        self, tvist: Filter | None = None, trajectory: Trajectory | None = None
+    ) -> Floats | None:
         """Simulate the motion until rest if no command comes, optionally with another filter or trajectory.
 
         Returns the last two shaped references played, then all until rest, shape (k, n) [rad]; None if rest

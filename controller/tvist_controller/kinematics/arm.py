@@ -223,7 +223,7 @@ class InverseDynamics(Arm):
         """Inertial parameters (10,) of the last link: both sets in a payload change, else the present one."""
         return (self._before, self._after) if self.changing else (self._after,)
 
-    def believe(self, bodies: tuple[Floats, ...]) -> None:
+    def use_bodies(self, bodies: tuple[Floats, ...]) -> None:
         """Use other inertial parameters at once, in the form of `bodies`."""
         self._before, self._after = bodies[0], bodies[-1]
         self._ticks_left, self._slew = len(bodies) - 1, SLEW

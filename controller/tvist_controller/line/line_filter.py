@@ -47,7 +47,7 @@ class LineFilter:
 
     def reduced_limits(self, limits: MotionLimits | None = None) -> MotionLimits:
         """Return reference limits with which the shaped reference keeps the arm's and the given limits."""
-        arm, (faster, harder) = self._arm, (1.0 + more for more in self.tvist.surplus)
+        arm, (faster, harder) = self._arm, (1.0 + more for more in self.tvist.excess_at_limits)
         limits = arm if limits is None else limits
         return MotionLimits(
             min(limits.velocity, arm.velocity / faster),

@@ -15,7 +15,7 @@ from tvist_plant.plant import PERIOD, Response, SimulatedArm
 
 
 @dataclass(frozen=True)
-class Driven:
+class DriveCommandSeries:
     """Drive commands of T ticks."""
 
     rest: DriveCommand
@@ -44,7 +44,7 @@ class DrivenLine:
         resting: int = 0,  # ticks before the first sample
         elastic: ElasticFeedForward | None = None,  # None for the paper's feed-forward
         law: Floats | None = None,  # friction to feed forward in this motion; None for that of the line
-    ) -> Driven:
+    ) -> DriveCommandSeries:
         """Compute the drive commands for a shaped reference, from rest."""
         drives = self._drives
         drives.wanted = elastic
@@ -58,13 +58,13 @@ class DrivenLine:
         targets, commands = np.empty((2, ticks, 3, len(start)))
         if elastic is None:
             all_to_drives(start, whole, PERIOD, *self._parts, targets, commands)
-            return Driven(rest, targets, commands, drives.delay)
+            return DriveCommandSeries(rest, targets, commands, drives.delay)
         before, middle = start, start
         for tick, last in enumerate(whole):
             targets[tick], command = self._tick(before, middle, last)
             commands[tick] = command.q, command.qd, command.torque
             before, middle = middle, last
-        return Driven(rest, targets, commands, drives.delay)
+        return DriveCommandSeries(rest, targets, commands, drives.delay)
 
     def _tick(self, before: Floats, middle: Floats, last: Floats) -> tuple[Floats, DriveCommand]:
         """Return the target in the middle of three shaped references, shape (3, n), and its drive command."""
@@ -73,7 +73,7 @@ class DrivenLine:
         return signals[Q:TORQUE], self._drives.command(signals, self._dynamics.payload_parameters)
 
 
-def respond(plant: SimulatedArm, driven: Driven, seed: int) -> Response:
+def respond(plant: SimulatedArm, driven: DriveCommandSeries, seed: int) -> Response:
     """Move a plant with drive commands, from rest.
 
     Raises:

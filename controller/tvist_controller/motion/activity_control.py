@@ -92,7 +92,7 @@ class MotionControl:
             speed=self.motions.wanted_speed,
             slowest=self.motions.slowest,
             excess=tvist.excess,
-            surplus=tvist.surplus,
+            excess_at_limits=tvist.excess_at_limits,
             tcp=self.tcp,
             body=self.collisions.declared,
             bodies=cycle.dynamics.bodies,
@@ -101,16 +101,16 @@ class MotionControl:
         if time is None:
             return now
         move = self.motions.move
-        if move is None or move.course is None or self.activity not in {Activity.MOVING, Activity.PAUSED}:
+        if move is None or move.extendable is None or self.activity not in {Activity.MOVING, Activity.PAUSED}:
             return replace(now, movable=False)
         # Its time rate is 1, independent of the running motion.
         return replace(
             now,
             movable=True,
-            q=move.course.end,
+            q=move.extendable.end,
             speed=1.0,
             slowest=None,
-            after=move.course,
+            after=move.extendable,
             until=move.passed + time,
         )
 

@@ -11,7 +11,7 @@ from tvist_controller.line.limits import GENTLEST_STOP, REBOUND, StreamTorqueMar
 from tvist_controller.line.line_mode import LineMode
 from tvist_controller.motion.activity_control import MotionControl
 from tvist_controller.refusal import invalid
-from tvist_controller.trajectory import Compliant, Guided, MotionLimits, ServoFollower, Speed
+from tvist_controller.trajectory import Compliant, Guided, MotionLimits, ServoFollower, VelocityFollower
 from tvist_protocol.transitions import Activity
 
 G = TypeVar("G", bound=Guided)
@@ -37,7 +37,7 @@ class Guidance:
     def _rehearse(self) -> None:
         """Compile or load the kernels of a tool motion before a tick needs them."""
         q, still, arm = self.reach * 0.1, np.zeros(len(self.reach)), self.motion.tool
-        speed = Speed((q, still, still), self.limits, self.torque, arm=arm)
+        speed = VelocityFollower((q, still, still), self.limits, self.torque, arm=arm)
         speed.aim(arm.jacobian(q)[:, 0] * 1e-3, 1.0, 1.0)
         speed.next()
         rotation, position = arm.pose(q)
@@ -53,7 +53,7 @@ class Guidance:
         return self.follow("servo_j", servo, shaped=shaped)
 
     def move_joints(self, qd: Floats, acceleration: float, *, shaped: bool) -> int:
-        """Approach joint velocities, see `Speed`; return the motion's number; RefusalError as in `check`."""
+        """Approach joint velocities; return the motion's number; RefusalError as in `check`."""
         self.check("speed_j", shaped=shaped)
         if shaped:
             most = self._most(shaped).velocity
@@ -63,7 +63,7 @@ class Guidance:
     def move_tool(
         self, twist: Floats, acceleration: float, angular_acceleration: float, *, shaped: bool
     ) -> int:
-        """Approach a tool velocity, see `Speed`; return the motion's number; RefusalError as in `check`."""
+        """Approach a tool velocity; return the motion's number; RefusalError as in `check`."""
         self.check("speed_l", shaped=shaped)
         accelerations = (acceleration, angular_acceleration)
         return self._approach("speed_l", self.motion.tool, twist, accelerations, shaped=shaped)
@@ -71,10 +71,12 @@ class Guidance:
     def _approach(
         self, trigger: str, tool: Arm | None, goal: Floats, accelerations: tuple[float, ...], *, shaped: bool
     ) -> int:
-        speed = self._present(Speed, shaped)
+        speed = self._present(VelocityFollower, shaped)
         if speed is None or speed.arm is not tool:
             rate = self.motion.motions.speed
-            speed = Speed(self._start(shaped), self._most(shaped), self.torque, rate=rate, arm=tool)
+            speed = VelocityFollower(
+                self._start(shaped), self._most(shaped), self.torque, rate=rate, arm=tool
+            )
         speed.aim(goal, *accelerations)
         return self.follow(trigger, speed, shaped=shaped)
 
@@ -99,13 +101,15 @@ class Guidance:
             float(np.linalg.norm(twist[3:])) / angular_acceleration,
         )
         straight = (
-            self.motion.activity is Activity.GUIDED and isinstance(present, Speed) and present.arm is not None
+            self.motion.activity is Activity.GUIDED
+            and isinstance(present, VelocityFollower)
+            and present.arm is not None
         )
         if not straight or duration == 0.0:
             self.stop_joints(fastest / duration if duration > 0.0 else None, "stop_l")
             return
         harder = max(duration * GENTLEST_STOP / fastest, 1.0)
-        stop = Speed(self._start(shaped=False), self.limits, self.torque, arm=tool)
+        stop = VelocityFollower(self._start(shaped=False), self.limits, self.torque, arm=tool)
         stop.aim(np.zeros(6), harder * acceleration, harder * angular_acceleration)
         stop.acceleration = harder * fastest / duration
         self._halt("stop_l", stop, stop.duration)
@@ -164,15 +168,15 @@ class Guidance:
             return
         lead.take(self.halting(self._start(shaped=False), deceleration))
 
-    def halting(self, state: tuple[Floats, Floats, Floats], deceleration: float) -> Speed:
+    def halting(self, state: tuple[Floats, Floats, Floats], deceleration: float) -> VelocityFollower:
         """Return a trajectory from a state to rest with a deceleration [rad/s^2]."""
-        stop = Speed(state, self.limits, self.torque)
+        stop = VelocityFollower(state, self.limits, self.torque)
         stop.aim(np.zeros_like(state[0]), deceleration)
         return stop
 
     def slow_down(self) -> None:
         """Until the next command, bring motion with commanded velocity to rest; a commanded posture stays."""
-        if isinstance(present := self.guided, Speed):
+        if isinstance(present := self.guided, VelocityFollower):
             present.come_to_rest()
 
     def _start(self, shaped: bool) -> tuple[Floats, Floats, Floats]:

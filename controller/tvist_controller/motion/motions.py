@@ -26,9 +26,9 @@ class RunningMove:
     def __init__(self, planned: PlannedMove, cycle: ControlCycle) -> None:
         self._velocity, self._cycle = planned.velocity, cycle
         self._window, self._peak = planned.window, planned.peak
-        self._room, self._surplus = planned.room, planned.surplus
+        self._room, self._excess_at_limits = planned.room, planned.excess_at_limits
         self._held = False
-        self.course = planned.course  # state from which its last part can be extended; None if it cannot
+        self.extendable = planned.extendable  # from here its last part can be extended; None if not
         self._parts = len(planned.parts)
         self._trajectory, *coming = planned.parts
         self.coming: tuple[PlannedMotion, ...] = tuple(coming)  # parts that have not started
@@ -56,7 +56,7 @@ class RunningMove:
         else:
             self._cycle.go_on(longer)
             self._velocity, self._window, self.coming = planned.velocity, planned.window, tuple(coming)
-        self._peak, self.course = planned.peak, planned.course
+        self._peak, self.extendable = planned.peak, planned.extendable
         self._parts += len(coming)
         self.pace(speed, slowest)
 
@@ -65,11 +65,11 @@ class RunningMove:
         self._cycle.tvist.aim(self._trajectory.path.end)
 
     def _rate(self, speed: float, slowest: float | None) -> float:
-        """Return a time rate [-], lower for motions planned for a shaper with less delay, peak or surplus."""
+        """Return a time rate [-], lower for motions planned for a shaper with less delay, peak or excess."""
         tvist = self._cycle.tvist
         room = min(_fitting(self._window, tvist.delay), _fitting(self._peak, tvist.peak))
-        if tvist.surplus != self._surplus:
-            (velocity, acceleration), (more_velocity, more_acceleration) = self._room, tvist.surplus
+        if tvist.excess_at_limits != self._excess_at_limits:
+            (velocity, acceleration), (more_velocity, more_acceleration) = self._room, tvist.excess_at_limits
             room = min(
                 room, velocity / (1.0 + more_velocity), math.sqrt(acceleration / (1.0 + more_acceleration))
             )

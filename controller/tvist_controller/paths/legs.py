@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tvist_controller.kinematics.pose import Placement
-from tvist_controller.paths.tool_curves import PER_RADIAN, ToolLine, ToolWay
+from tvist_controller.paths.tool_curves import PER_RADIAN, BlendableCurve, ToolLine
 from tvist_controller.trajectory.base import Floats
 from tvist_controller.trajectory.spline import Knots
 
@@ -25,7 +25,7 @@ STEEPER = 1.5  # largest ratio of the curvature where two blends meet to the sma
 
 
 @dataclass(frozen=True)
-class JointWay:
+class JointCurve:
     """Straight line in joint space."""
 
     start: Floats  # joint positions at the start, shape (n,) [rad]
@@ -90,7 +90,7 @@ class LegSpeed:
 class Leg:
     """One requested part of a path."""
 
-    way: ToolWay | JointWay
+    way: BlendableCurve | JointCurve
     knots: Knots  # the joints' motion along the whole part
     corner: Placement  # pose of the tool at its end
     pacing: LegSpeed

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tvist_controller.paths.legs import BlendJunction, JointWay, Leg, LegSpeed, meetings
+from tvist_controller.paths.legs import BlendJunction, JointCurve, Leg, LegSpeed, meetings
 from tvist_controller.paths.tool_curves import EvenBlend, ToolBlend, ToolCurve, ToolPart, ToolState, evenly
-from tvist_controller.paths.tracking import Tracker, WayError
+from tvist_controller.paths.tracking import Tracker, TrackingError
 from tvist_controller.trajectory.base import Floats
 from tvist_controller.trajectory.spline import Knots, SplineCurve
 
@@ -67,7 +67,7 @@ class Route(NamedTuple):
 
 
 def route_of(legs: Sequence[Leg], tracker: Tracker, start: Branch | None = None) -> Route:
-    """Divide a path into runs at stops, from `start` (default: first leg's); raise WayError if impossible."""
+    """Divide a path into runs at stops from `start` (default: first leg's); raise TrackingError if impossible."""
     route, last = Route([Run()], [], []), len(legs) - 1
     meets = meetings(legs)
     here = start
@@ -130,7 +130,7 @@ def _check_joined(runs: list[Run], tracker: Tracker) -> None:
     for run in runs:
         for one, other in pairwise(run):
             if np.abs(one.knots.q[-1] - other.knots.q[0]).max() > SAME:
-                raise WayError(0.0, tracker.pose(one.knots.q[-1]), one.knots.q[-1])
+                raise TrackingError(0.0, tracker.pose(one.knots.q[-1]), one.knots.q[-1])
 
 
 def length_of(run: Run) -> float:
@@ -149,9 +149,9 @@ def _from(q: Floats, cut: _Cut, tracker: Tracker) -> _Cut:
 def _rest_of(leg: Leg, start: float, end: float, q: Floats, tracker: Tracker) -> Piece:
     """Return the part of a leg between its blends, starting at posture q."""
     if start == 0.0 and end == leg.way.length and (q == leg.q).all():
-        return Piece(leg.knots, leg.pacing, None, isinstance(leg.way, JointWay), leg.where)
-    if isinstance(leg.way, JointWay):
-        way = leg.way if start > 0.0 else JointWay(q, leg.way.end)
+        return Piece(leg.knots, leg.pacing, None, isinstance(leg.way, JointCurve), leg.where)
+    if isinstance(leg.way, JointCurve):
+        way = leg.way if start > 0.0 else JointCurve(q, leg.way.end)
         return Piece(way.part(start, min(end, way.length)), leg.pacing, None, True, leg.where)
     return Piece(tracker.follow(ToolPart(leg.way, start, end), q), leg.pacing, None, False, leg.where)
 
@@ -182,7 +182,7 @@ def _cut(
         after = after if meets[1] is None else meets[1].s
         try:
             piece, curve = _blend(leg, then, (before, after), meets, here.q, tracker)
-        except WayError as error:
+        except TrackingError as error:
             why = "passes a singular posture: give a smaller radius, or move the corner"
             raise _NoBlendError(why) from error
         if meets != (None, None):
@@ -207,7 +207,7 @@ def _blend(
     """Return a blend replacing `lengths` of two legs, and the tool curve if any; q is the present posture."""
     pacing, (before, after) = leg.pacing.meeting(then.pacing), lengths
     start = leg.way.length - before
-    if isinstance(leg.way, JointWay) or isinstance(then.way, JointWay):
+    if isinstance(leg.way, JointCurve) or isinstance(then.way, JointCurve):
         ends = (_joints(leg, start, tracker, from_end=True), _joints(then, after, tracker, from_end=False))
         s = np.array([0.0, before + after])
         knots = Knots(s, *(np.array(pair) for pair in zip(*ends, strict=True)))
@@ -244,7 +244,7 @@ def _rounding(leg: Leg, start: ToolState, end: ToolState, *, drawn_out: bool) ->
 
 def _joints(leg: Leg, s: float, tracker: Tracker, *, from_end: bool) -> tuple[Floats, Floats, Floats]:
     """Return joint positions and derivatives at s on a leg, tracked from the posture at its start or end."""
-    if isinstance(leg.way, JointWay):
+    if isinstance(leg.way, JointCurve):
         return leg.way.at(s)
     corner, near, sign = (leg.way.length, leg.knots.q[-1], -1.0) if from_end else (0.0, leg.knots.q[0], 1.0)
     knots = tracker.follow(ToolPart(leg.way, corner, s), near)
@@ -252,6 +252,6 @@ def _joints(leg: Leg, s: float, tracker: Tracker, *, from_end: bool) -> tuple[Fl
 
 
 def _within(leg: Leg, radius: float, tracker: Tracker, *, from_end: bool) -> float:
-    if isinstance(leg.way, JointWay):
+    if isinstance(leg.way, JointCurve):
         return leg.way.within(radius, lambda q: tracker.pose(q).position, from_end=from_end)
     return leg.way.within(radius)

@@ -38,7 +38,7 @@ class ToolCurve(ABC):
         """Return the state at a length from the start [m]."""
 
 
-class ToolWay(ToolCurve):
+class BlendableCurve(ToolCurve):
     """Path of the tool that can be blended with the next path."""
 
     @abstractmethod
@@ -46,7 +46,7 @@ class ToolWay(ToolCurve):
         """Return the length, from either end, within the radius [m]; may exceed the curve or be infinite."""
 
 
-class ToolLine(ToolWay):
+class ToolLine(BlendableCurve):
     """Straight line with constant rotation by the shortest way."""
 
     def __init__(self, start: Placement, end: Placement) -> None:
@@ -57,7 +57,7 @@ class ToolLine(ToolWay):
         """Velocity and angular velocity per unit of length, base frame, shape (6,) [-, rad/m]."""
 
     def within(self, radius: float) -> float:
-        """See `ToolWay.within`."""
+        """See `BlendableCurve.within`."""
         speed = float(np.linalg.norm(self.first[:3]))
         return radius / speed if speed > 0.0 else np.inf
 
@@ -68,7 +68,7 @@ class ToolLine(ToolWay):
         return ToolState(pose, self.first, np.zeros(6))
 
 
-class ToolArc(ToolWay):
+class ToolArc(BlendableCurve):
     """Arc of a circle from one pose through a point to another pose.
 
     The tool turns with the tangent, ignoring the end orientation, or steadily to the end orientation the
@@ -99,7 +99,7 @@ class ToolArc(ToolWay):
         self._rate, self._turning = angle / self.length, turning / self.length
 
     def within(self, radius: float) -> float:
-        """See `ToolWay.within`."""
+        """See `BlendableCurve.within`."""
         share = radius / (2.0 * float(np.linalg.norm(self._out)))
         return 2.0 * float(np.arcsin(share)) / self._rate if share < 1.0 else np.inf
 

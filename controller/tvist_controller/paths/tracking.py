@@ -20,7 +20,7 @@ FARTHEST = 1.0  # joint angle beyond which a solution counts as another posture 
 STEEPEST = 300.0  # joint turn per metre of path above which the arm is close to a singular posture [rad/m]
 
 
-class WayError(Exception):
+class TrackingError(Exception):
     """The joints cannot follow the path."""
 
     def __init__(self, s: float, pose: Placement, q: Floats) -> None:
@@ -61,7 +61,7 @@ class Tracker:
         return None if second is None else (first, second)
 
     def follow(self, curve: ToolCurve, q: Floats) -> Knots:
-        """Return the joints' motion along a tool path; raise WayError if it is singular or out of reach."""
+        """Return the joints' motion along a tool path; raise TrackingError if singular or out of reach."""
         pieces = 1 if curve.length < SHORT else max(int(np.ceil(curve.length / SPACING)), 2)
         knots, step = [self._knot(curve, 0.0, q)], curve.length / pieces
         # One by one, so that a long path out of reach fails after few knots.
@@ -85,11 +85,11 @@ class Tracker:
             )
             if off <= TOLERANCE:
                 return [last]
-        except WayError:
+        except TrackingError:
             if length < CLOSEST:
                 raise
         if length < CLOSEST:
-            raise WayError(middle, curve.at(middle).pose, start[1])
+            raise TrackingError(middle, curve.at(middle).pose, start[1])
         first = self._between(curve, start, middle)
         return first + self._between(curve, first[-1], end)
 
@@ -98,7 +98,7 @@ class Tracker:
         q = self.solve(state.pose, guess)
         rates = None if q is None else self.rates(q, state)
         if q is None or rates is None:
-            raise WayError(s, state.pose, guess)
+            raise TrackingError(s, state.pose, guess)
         return s, q, *rates
 
 

@@ -29,9 +29,9 @@ from tvist_shaping.failures import FAILURES
 from tvist_shaping.filter import QUICKEST
 from tvist_shaping.named import BUILT_IN, AnyShaper, Registry
 
-SURPLUSES = deque[tuple[ModeSource, AnyShaper | None, str, int, tuple[float, float]]](maxlen=32)
-"""Cache of `surplus` for all robots: source of modes, own shaper, name, number of modes, result."""
-POSTURES = 40  # number of postures at which modes are computed for `surplus`
+EXCESSES = deque[tuple[ModeSource, AnyShaper | None, str, int, tuple[float, float]]](maxlen=32)
+"""Cache of `excess_at_limits` for all robots: source of modes, own shaper, name, number of modes, result."""
+POSTURES = 40  # number of postures at which modes are computed for `excess_at_limits`
 HALF_STEP = 0.03  # half the travel over which the modes' change is measured [rad]
 TIME = 0.01  # time over which the quickest change of modes is measured [s]
 MARGIN = 1.1  # margin for postures not computed [-]
@@ -106,20 +106,20 @@ class FilterPlanner:
         description = self._setup.description
         estimator = make_estimator(source, modes, declared, where_modes)
         tvist = choose_filter(name, estimator, description.joints, where=where, known=self._known)
-        tvist.surplus = self._surplus(tvist, source)
+        tvist.excess_at_limits = self._excess_at_limits(tvist, source)
         return tvist
 
-    def _surplus(self, tvist: Filter, source: ModeSource) -> tuple[float, float]:
-        """Return the filter's largest `surplus` for all payloads, cached because it takes long."""
+    def _excess_at_limits(self, tvist: Filter, source: ModeSource) -> tuple[float, float]:
+        """Return the filter's largest `excess_at_limits` for all payloads, cached because it takes long."""
         name, modes, own = tvist.name, tvist.estimator.modes, self._known.own.get(tvist.name)
-        for known, same, named, with_modes, found in tuple(SURPLUSES):
+        for known, same, named, with_modes, found in tuple(EXCESSES):
             if same is own and (named, with_modes) == (name, modes) and known == source:
                 return found
         masses = (0.0, self._setup.description.limits.payload) if source.knows_payload else (0.0,)
         payloads = [paper_payload(self._setup.description, mass) for mass in masses]
         estimators = [source.estimator(modes, payload) for payload in payloads]
-        found = surplus_of(tvist, estimators, self._setup.description)
-        SURPLUSES.append((source, own, name, modes, found))
+        found = excess_at_limits_of(tvist, estimators, self._setup.description)
+        EXCESSES.append((source, own, name, modes, found))
         return found
 
     def _with_feed_forward(self, source: ModeSource, tvist: Filter, where: str) -> FilterChoice:
@@ -239,7 +239,7 @@ def _calibration(command: SetEstimator, setup: Setup) -> Calibration:
     return load(command.calibration)
 
 
-def surplus_of(
+def excess_at_limits_of(
     tvist: Filter, estimators: Iterable[Estimator], description: RobotDescription
 ) -> tuple[float, float]:
     """Return the shares by which a filter's velocity and acceleration may exceed the reference's limits [-].

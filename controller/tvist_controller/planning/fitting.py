@@ -34,7 +34,7 @@ MIN_TORQUE_SHARE = 0.01
 """Smallest usable fraction of a motion's own torque; below it, gravity alone exceeds the limit [-]."""
 
 
-class Slower(NamedTuple):
+class SlowdownFactors(NamedTuple):
     """Factors of a motion's velocity and acceleration, at most 1 [-]."""
 
     velocity: float = 1.0
@@ -46,13 +46,13 @@ class Slower(NamedTuple):
         return min(self.velocity, math.sqrt(self.acceleration))
 
 
-AS_ASKED = Slower()
+AS_ASKED = SlowdownFactors()
 
 
-class Need(NamedTuple):
+class RequiredSlowdown(NamedTuple):
     """How much slower a motion must be, and the limit that requires it."""
 
-    slower: Slower
+    slower: SlowdownFactors
     binding: Binding  # the limit
     q: Floats  # posture at which it would be exceeded most, shape (n,) [rad]
     exceeds: str | None = None  # message if a torque limit is exceeded at any speed; else None
@@ -62,7 +62,7 @@ class Fitted(NamedTuple):
     """A motion within the limits."""
 
     motion: PlannedMotion
-    slower: Slower = AS_ASKED  # how much slower the motion is than requested
+    slower: SlowdownFactors = AS_ASKED  # how much slower the motion is than requested
     limited: Limited | None = None  # limit that slows it down, or that it exceeds; see `PlannedMove.limited`
     q: Floats | None = None  # posture in which the limit applies, shape (n,) [rad]; None without one
 
@@ -78,7 +78,7 @@ class Fitter:
 
     def fit(
         self,
-        make: Callable[[Slower], PlannedMotion],
+        make: Callable[[SlowdownFactors], PlannedMotion],
         now: PlanningState,
         tvist: Callable[[], Filter] | None,
         limits: MotionLimits | None = None,
@@ -86,8 +86,8 @@ class Fitter:
         """Plan a motion; while it exceeds a limit, plan it again more slowly.
 
         Near a limit, the motion is shaped in advance by the filter from `tvist`. With None, to save time, the
-        filter's `surplus` is kept free instead. `limits` are the requested ones; None if something else sets
-        the speed.
+        filter's `excess_at_limits` is kept free instead. `limits` are the requested ones; None if something
+        else sets the speed.
         """
         asked, need, slower = make(AS_ASKED), None, AS_ASKED
         motion = asked
@@ -102,8 +102,8 @@ class Fitter:
                 # A shaper's duration is constant, so a slower motion may use more of a limit than the last.
                 most = 1.0 - min(HASTE * 2.0 ** (number - TRIES), 0.5) if number >= TRIES else 1.0
                 rate = min(by.rate, most)
-                by = Slower(rate, rate**2)
-            slower = Slower(slower.velocity * by.velocity, slower.acceleration * by.acceleration)
+                by = SlowdownFactors(rate, rate**2)
+            slower = SlowdownFactors(slower.velocity * by.velocity, slower.acceleration * by.acceleration)
             motion = make(slower)
         if need is None:
             return Fitted(motion)
@@ -118,10 +118,10 @@ class Fitter:
 
     def _need(
         self, motion: PlannedMotion, now: PlanningState, tvist: Callable[[], Filter] | None
-    ) -> Need | None:
-        """Return how much to slow a motion: by a bound with the filter surplus or, if too much, as shaped."""
+    ) -> RequiredSlowdown | None:
+        """Return how much to slow a motion: by a bound with `excess_at_limits` or, if too much, as shaped."""
         q, qd, qdd = _states(motion)
-        faster, harder = (1.0 + more for more in now.surplus)
+        faster, harder = (1.0 + more for more in now.excess_at_limits)
         qd, qdd = faster * qd, harder * qdd
         found = self._exceeded(q, qd, qdd, qd, now, BLUNTED)
         ahead = None if found is None or tvist is None else shaped_ahead(motion, tvist())
@@ -132,32 +132,34 @@ class Fitter:
 
     def _exceeded(
         self, q: Floats, qd: Floats, qdd: Floats, speeds: Floats, now: PlanningState, blunted: float
-    ) -> Need | None:
+    ) -> RequiredSlowdown | None:
         """Return how much slower a motion must be for all limits; `speeds` are the velocities to check."""
         needs = self._kinematic(q, speeds, qdd), self._dynamic(q, qd, qdd, blunted, now)
         found = [need for need in needs if need is not None]
         return min(found, key=lambda need: need.slower.rate, default=None)
 
-    def _kinematic(self, q: Floats, qd: Floats, qdd: Floats) -> Need | None:
+    def _kinematic(self, q: Floats, qd: Floats, qdd: Floats) -> RequiredSlowdown | None:
         """Return how much slower a motion must be for joint velocities and accelerations."""
         fast = np.abs(qd).max(axis=0, initial=0.0) / self._velocity
         hard = np.abs(qdd).max(axis=0, initial=0.0) / self._acceleration
         factors = [SHARE / float(most) if most > 1.0 + ROUNDING else 1.0 for most in (fast.max(), hard.max())]
-        slower = Slower(*factors)
+        slower = SlowdownFactors(*factors)
         if slower == AS_ASKED:
             return None
         by_velocity = slower.velocity <= math.sqrt(slower.acceleration)
         joint = int(np.argmax(fast if by_velocity else hard))
         values = (qd if by_velocity else qdd)[:, joint]
         binding = limit_of("velocity" if by_velocity else "acceleration", joint, self._description)
-        return Need(slower, binding, q[min(int(np.argmax(np.abs(values))), len(q) - 1)])
+        return RequiredSlowdown(slower, binding, q[min(int(np.argmax(np.abs(values))), len(q) - 1)])
 
-    def _dynamic(self, q: Floats, qd: Floats, qdd: Floats, blunted: float, now: PlanningState) -> Need | None:
+    def _dynamic(
+        self, q: Floats, qd: Floats, qdd: Floats, blunted: float, now: PlanningState
+    ) -> RequiredSlowdown | None:
         """Return how much slower a motion must be for torques: in acceleration, velocity or both."""
         dynamics, limits, factors = self._dynamics, self._torque, [1.0, 1.0]
         worst, need = 1.0, None
-        for believed in now.bodies:
-            dynamics.believe((believed,))
+        for parameters in now.bodies:
+            dynamics.use_bodies((parameters,))
             gravity = dynamics.gravities(q)
             moving = blunted * (dynamics.torques(q, qd, qdd) - gravity)
             effort = np.abs(gravity + moving)
@@ -172,7 +174,7 @@ class Fitter:
             least, joint = float(share.min()), int(np.argmin(share.min(axis=0)))
             if least < worst:
                 worst, which = least, limit_of("torque", joint, self._description)
-                need = Need(AS_ASKED, which, q[int(np.argmin(share[:, joint]))])
+                need = RequiredSlowdown(AS_ASKED, which, q[int(np.argmin(share[:, joint]))])
             if need is not None and least < MIN_TORQUE_SHARE:
                 limit, most = limits[joint], float(effort[:, joint].max())
                 exceeds = (
@@ -180,14 +182,14 @@ class Fitter:
                     f"{most - limit:.1f} beyond its limit of {limit:g}, since gravity alone takes it: "
                     "choose another way, or a lighter payload"
                 )
-                return need._replace(slower=Slower(0.0, 0.0), exceeds=exceeds)
+                return need._replace(slower=SlowdownFactors(0.0, 0.0), exceeds=exceeds)
             turning = dynamics.torques(q, qd, np.zeros_like(qdd)) - gravity
             steady = 2.0 * np.abs(turning) > np.abs(moving)
             for number, part in enumerate((steady, ~steady)):
                 lowest = float(np.where(beyond & part, share, 1.0).min())
                 if lowest < 1.0:
                     factors[number] = min(factors[number], SHARE * lowest ** (0.5, 1.0)[number])
-        return None if need is None else need._replace(slower=Slower(*factors))
+        return None if need is None else need._replace(slower=SlowdownFactors(*factors))
 
 
 def _states(motion: PlannedMotion) -> tuple[Floats, Floats, Floats]:

@@ -9,7 +9,7 @@ import numpy as np
 from tvist_controller.foresight.collision import CLEARANCE, CloseBodies, CollisionModel
 from tvist_controller.line.limits import arm_limits, rate_of
 from tvist_controller.planning.filter_planner import FilterPlanner
-from tvist_controller.planning.fitting import Fitter, Slower, keeping_motion
+from tvist_controller.planning.fitting import Fitter, SlowdownFactors, keeping_motion
 from tvist_controller.planning.slower import Limited, longer_joint_motion, slower_joint_motion
 from tvist_controller.planning.snapshot import ExtendableMotion, PlanningState
 from tvist_controller.refusal import RefusalError
@@ -42,9 +42,9 @@ class PlannedMove(NamedTuple):
     peak: float = math.inf  # largest `Filter.peak` at which the limits hold at full rate [-]
     room: tuple[float, float] = (math.inf, math.inf)
     """Ratios of the arm's velocity and acceleration limits to the motion's [-]."""
-    course: ExtendableMotion | None = None
+    extendable: ExtendableMotion | None = None
     """State from which its last part can be extended while it runs; None if it cannot."""
-    surplus: tuple[float, float] = (0.0, 0.0)  # `Filter.surplus` of the filter it was planned for [-]
+    excess_at_limits: tuple[float, float] = (0.0, 0.0)  # `Filter.excess_at_limits` of its filter [-]
 
 
 class MovePlanner(Fitter):
@@ -64,7 +64,7 @@ class MovePlanner(Fitter):
             agility = at_least(limits, AGILE.acceleration, AGILE.jerk)
         rate = rate_of(now.speed, limits.velocity, now.slowest)
 
-        def make(slower: Slower) -> PlannedMotion:
+        def make(slower: SlowdownFactors) -> PlannedMotion:
             kept = replace(
                 limits,
                 velocity=limits.velocity * slower.velocity,
@@ -95,7 +95,7 @@ class MovePlanner(Fitter):
             velocity,
             limited,
             room=(arms.velocity / velocity, arms.acceleration / (limits.acceleration * slower.acceleration)),
-            surplus=now.surplus,
+            excess_at_limits=now.excess_at_limits,
         )
 
     def _lasting(self, path: JointLine, duration: float, now: PlanningState) -> MotionLimits:

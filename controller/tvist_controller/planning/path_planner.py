@@ -17,11 +17,11 @@ from tvist_controller.paths.pacing import (
     law_of,
 )
 from tvist_controller.paths.route import Branch, Route, Run, length_of, route_of
-from tvist_controller.paths.tracking import Tracker, WayError
+from tvist_controller.paths.tracking import Tracker, TrackingError
 from tvist_controller.planning.filter_planner import FilterPlanner
-from tvist_controller.planning.fitting import Fitted, Slower
+from tvist_controller.planning.fitting import Fitted, SlowdownFactors
+from tvist_controller.planning.kinematic_planner import KinematicPlanner
 from tvist_controller.planning.move_planner import MovePlanner, PlannedMove
-from tvist_controller.planning.reachable import Reachable
 from tvist_controller.planning.slower import Limited, slower_path
 from tvist_controller.planning.snapshot import ExtendableMotion, PlanningState
 from tvist_controller.refusal import RefusalError
@@ -54,15 +54,15 @@ class PathPlanner:
     """Plans one robot's motions along paths."""
 
     def __init__(
-        self, setup: Setup, filters: FilterPlanner, moves: MovePlanner, reachable: Reachable
+        self, setup: Setup, filters: FilterPlanner, moves: MovePlanner, kinematic: KinematicPlanner
     ) -> None:
         self._description, self._filters, self._moves = setup.description, filters, moves
-        self._reachable = reachable
+        self._kinematic = kinematic
 
     def plan(self, command: MoveL | MoveC | MovePath, now: PlanningState) -> PlannedMove | None:
         """Plan a motion from rest, or an extension (None: too late); raise RefusalError if impossible."""
         tracker = Tracker(self._description, now.tcp)
-        legs = list(self._reachable.legs(command, tracker, now))
+        legs = list(self._kinematic.legs(command, tracker, now))
         count = len(command.segments) if isinstance(command, MovePath) else 1
         if now.after is not None:
             return self._further(command.jerk, legs, count, tracker, now)
@@ -85,8 +85,8 @@ class PathPlanner:
     ) -> Route:
         try:
             return route_of(legs, tracker, start)
-        except WayError as error:
-            raise self._reachable.refusal(error, "segments", 1.0, legs[-1].corner, now.tcp) from error
+        except TrackingError as error:
+            raise self._kinematic.refusal(error, "segments", 1.0, legs[-1].corner, now.tcp) from error
 
     def _further(
         self, jerk: float, legs: list[Leg], count: int, tracker: Tracker, now: PlanningState
@@ -105,7 +105,7 @@ class PathPlanner:
         ground = before.ground.then(cuts.first, cuts.branch, run, curve)
         delay = max(self._delay(curve, tvist), before.window)
 
-        def make(slower: Slower) -> PlannedMotion:
+        def make(slower: SlowdownFactors) -> PlannedMotion:
             edges = cuts.first, cuts.known - cuts.first
             law = going_on(before.law, edges, ground, curve, joints, jerk, delay, slower.rate)
             if law is None:
@@ -120,9 +120,10 @@ class PathPlanner:
         law = fitted.motion.law
         assert isinstance(law, RetimedLaw)
         told, count = _told(fitted, run, branch.s), before.segments + count
-        course = None if coming else _course(run, route, curve, ground, law, count, delay, branch.s)
+        extendable = None if coming else _extendable(run, route, curve, ground, law, count, delay, branch.s)
         velocity = fastest(law, curve)
-        moves = [PlannedMove((fitted.motion,), velocity, told, window=delay, peak=tvist.peak, course=course)]
+        planned = PlannedMove((fitted.motion,), velocity, told, window=delay, peak=tvist.peak)
+        moves = [planned._replace(extendable=extendable)]
         for further in coming:
             move = self._along(further, route, jerk, tvist, now, count)
             self._check_clear(move.parts[0].path.whole, further, (0.0, length_of(further)), now)
@@ -175,21 +176,22 @@ class PathPlanner:
         highest = fastest(law, curve)
         rate = rate_of(now.speed, highest, now.slowest)
 
-        def make(slower: Slower) -> PlannedMotion:
+        def make(slower: SlowdownFactors) -> PlannedMotion:
             return self._planned(curve, law.slowed(law.duration / slower.rate), rate)
 
         fitted = self._moves.fit(make, now, lambda: self._filters.like(now.filter))
         kept, last = fitted.motion.law, run is route.runs[-1]
         assert isinstance(kept, RetimedLaw)
-        course = _course(run, route, curve, ground, kept, count, delay) if last else None
+        extendable = _extendable(run, route, curve, ground, kept, count, delay) if last else None
         velocity, told = highest * fitted.slower.rate, _told(fitted, run) or slower
-        return PlannedMove((fitted.motion,), velocity, told, window=delay, peak=tvist.peak, course=course)
+        planned = PlannedMove((fitted.motion,), velocity, told, window=delay, peak=tvist.peak)
+        return planned._replace(extendable=extendable)
 
     def _curve(
         self, knots: Knots, run: Run, tvist: Filter, now: PlanningState
     ) -> tuple[SplineCurve, JointLimits]:
         """Return the joints' motion along a run, checked for range, and the joints' limits."""
-        self._reachable.check_range(knots.s / knots.s[-1], knots.q, run[0].where)
+        self._kinematic.check_range(knots.s / knots.s[-1], knots.q, run[0].where)
         limits, peak = self._description.limits, tvist.peak
         acceleration = np.array(limits.acceleration) * (1.0 - now.excess)
         velocity = SPARED * np.array(limits.velocity) / peak
@@ -239,7 +241,7 @@ def _joined(
     )
 
 
-def _course(
+def _extendable(
     run: Run,  # the last one of the route
     route: Route,
     curve: SplineCurve,

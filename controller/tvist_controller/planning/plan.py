@@ -16,7 +16,7 @@ from tvist_protocol.replies import Posture, Reply, ToolPose
 from tvist_shaping.base import Filter
 from tvist_urscript import Script
 
-Found = PlannedMove | FilterChoice | Filter | Posture | ToolPose | Script | None
+PlanResult = PlannedMove | FilterChoice | Filter | Posture | ToolPose | Script | None
 """Possible results of a plan; None if nothing changes."""
 
 
@@ -25,9 +25,9 @@ class Planning(NamedTuple):
 
     needs: tuple[str, ...]  # fields of the snapshot that the plan depends on
     by: type  # class of the planner; a `Planner` has one instance
-    make: Callable[[Any, Any, PlanningState], Found]
+    make: Callable[[Any, Any, PlanningState], PlanResult]
     """Returns the plan for planner, command and state; raises `RefusalError`."""
-    within_tick: Callable[[Any, Any, PlanningState], Found] | None = None
+    within_tick: Callable[[Any, Any, PlanningState], PlanResult] | None = None
     """Makes a possibly worse plan quickly enough for a tick; None if there is only `make`."""
 
 
@@ -35,7 +35,7 @@ class Plan(NamedTuple):
     """Result of planning a command, valid while the state that the plan depends on stays equal."""
 
     state: Mapping[str, Any]  # fields of the snapshot that the plan depends on
-    found: Found | RefusalError  # what was planned, or the refusal; None if no motion may start
+    found: PlanResult | RefusalError  # what was planned, or the refusal; None if no motion may start
     until: float = 0.0  # see `PlanningState.until`
 
 
@@ -51,7 +51,7 @@ Order = Callable[[Command, PlanningState], Callable[[], Plan]]
 """Orders a plan on a state; returns a function that waits for it."""
 
 
-class MakesPlans(Protocol):
+class PlannerLike(Protocol):
     """Interface of `Planner`, which is in a higher layer than users of plans."""
 
     filters: FilterPlanner

@@ -94,8 +94,8 @@ class PlanningState(Struct, frozen=True, eq=False, gc=False):
     speed: float  # programmed speed fraction [-]
     slowest: float | None  # velocity limit of reduced mode; None if inactive [rad/s]
     excess: float  # `Filter.excess` of the filter: relative excess of acceleration [-]
-    surplus: tuple[float, float]
-    """`Filter.surplus` of the filter: relative excess of velocity and acceleration at the arm's limits [-]."""
+    excess_at_limits: tuple[float, float]
+    """`Filter.excess_at_limits`: relative excess of velocity and acceleration at the arm's limits [-]."""
     tcp: tuple[float, ...]  # tool centre point in the flange frame: x y z [m] and rotation vector [rad]
     body: Body  # payload in the collision model
     bodies: tuple[Floats, ...]  # possible inertial parameters of the last link, see `InverseDynamics.bodies`
@@ -106,7 +106,10 @@ class PlanningState(Struct, frozen=True, eq=False, gc=False):
 
 
 FILTER = ("filter",)  # fields that a filter depends on
-MOTION = ("movable", "q", "speed", "slowest", "excess", "surplus", "tcp", "body", "bodies", "filter", "after")
+MOTION = (
+    "movable", "q", "speed", "slowest", "excess", "excess_at_limits",
+    "tcp", "body", "bodies", "filter", "after",
+)  # fmt: skip
 """Fields that a motion depends on."""
 TOOL = ("tcp",)  # fields that an answer about tool kinematics depends on; the arm may move on meanwhile
 SCRIPT = ("script",)  # fields that a statement for a running program depends on

@@ -90,33 +90,33 @@ def _moves(title: str, names: Sequence[str], description: RobotDescription) -> s
     return "\n".join((f"def {title}():", *moves, "end", ""))
 
 
-class Kept(NamedTuple):
+class StoredProgram(NamedTuple):
     """A program and its sender."""
 
     script: Script
     origin: str | None  # address of the machine that sent it; None if unknown
 
 
-class KeptPrograms:
+class StoredPrograms:
     """Built-in programs, compiled when loaded, and programs that clients sent."""
 
     def __init__(self, built_in: Iterable[str]) -> None:
         self._built_in = frozenset(built_in)
-        self._kept: dict[str, Kept] = {}
+        self._kept: dict[str, StoredProgram] = {}
 
     @property
     def names(self) -> list[str]:
         """Names of all programs, sorted."""
         return sorted(self._built_in | set(self._kept))
 
-    def keep(self, name: str, kept: Kept) -> None:
+    def keep(self, name: str, kept: StoredProgram) -> None:
         """Store a program under its name, replacing an earlier one."""
         if name not in self._kept and len(self._kept) >= MAX_KEPT:
             why = f"{MAX_KEPT} programs are kept already: send this one with program.run"
             raise RefusalError("busy", "name", why, MAX_KEPT)
         self._kept[name] = kept
 
-    def find(self, name: str) -> Kept:
+    def find(self, name: str) -> StoredProgram:
         """Return a stored program."""
         if name not in self._kept:
             raise invalid("name", repr(name), f"one of {', '.join(self.names)}")

@@ -5,7 +5,7 @@ from functools import cache
 from typing import Any
 
 from tvist_controller.programs.arguments import checked
-from tvist_controller.programs.functions.family import Family, Parts
+from tvist_controller.programs.functions.family import FunctionContext, FunctionGroup
 from tvist_controller.programs.functions.force import ForceFunctions
 from tvist_controller.programs.functions.gripper import GripperFunctions
 from tvist_controller.programs.functions.motions import MotionFunctions
@@ -18,7 +18,7 @@ from tvist_controller.programs.functions.terminals import RegisterFunctions, Ter
 from tvist_controller.programs.functions.unsimulated import MISSING, SUBJECTS
 from tvist_urscript import Signature, Signatures, names, signatures
 
-FAMILIES: tuple[type[Family], ...] = (
+FUNCTION_GROUPS: tuple[type[FunctionGroup], ...] = (
     MotionFunctions,
     ForceFunctions,
     PoseFunctions,
@@ -46,15 +46,15 @@ MOVING = frozenset(names(MotionFunctions)) | {
 def known_signatures() -> Signatures:
     """Return the signature of each function; the language's own are in `tvist_urscript`."""
     return {
-        **{name: one for family in FAMILIES for name, one in signatures(family).items()},
+        **{name: one for family in FUNCTION_GROUPS for name, one in signatures(family).items()},
         **{name: Signature(given) for name, (given, _) in SUBJECTS.items()},
     }
 
 
-def functions(parts: Parts) -> dict[str, Callable[..., Any]]:
+def functions(parts: FunctionContext) -> dict[str, Callable[..., Any]]:
     """Return the functions for the programs of one robot, by name."""
     joints, found = parts.access.description.joints, dict(MISSING)
-    for family in FAMILIES:
+    for family in FUNCTION_GROUPS:
         subject = family(parts)
         found |= {name: checked(getattr(subject, name), joints) for name in names(family)}
     return found

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import readable
 from tvist_controller.programs.arm import ProgramArm
-from tvist_controller.programs.compiling import Kept, KeptPrograms, built_in
-from tvist_controller.programs.functions.family import Parts
+from tvist_controller.programs.compiling import StoredProgram, StoredPrograms, built_in
+from tvist_controller.programs.functions.family import FunctionContext
 from tvist_controller.programs.indicators import MissedTurns, Popups, RunstateOutputs, Watchdogs
 from tvist_controller.programs.interpreter import StatementQueue
 from tvist_controller.programs.kinematics import ProgramKinematics
@@ -53,15 +53,15 @@ class ProgramPlayer:
         self._runstate = RunstateOutputs(access.peripherals)
         kinematics = ProgramKinematics(access.description, access.motion, self.arm.spend)
         self._functions = functions(
-            Parts(
+            FunctionContext(
                 access, self.arm, kinematics, self.popups, self._watchdogs, self.sockets, self.statements,
                 self._runstate,
             )
         )  # fmt: skip
-        self.kept = KeptPrograms(built_in(access.description))  # programs that can be loaded
+        self.kept = StoredPrograms(built_in(access.description))  # programs that can be loaded
         self.name: str | None = None  # name of the loaded program; None without one
         self.state: ProgramState = "STOPPED"
-        self.loaded: Kept | None = None
+        self.loaded: StoredProgram | None = None
         self._main: _Running | None = None
         self._all: list[_Running] = []  # programs, oldest first
         self._starved: set[_Running] = set()  # programs that got none of the last tick's evaluations
@@ -245,7 +245,7 @@ class ProgramPlayer:
 
     # ------------------------------------------------------------------ for commands
 
-    def load(self, name: str, program: Kept, why: str) -> None:
+    def load(self, name: str, program: StoredProgram, why: str) -> None:
         """Load the program to play next; end a running one and stop the arm."""
         if self._main is not None:
             self._close(self._main, why)

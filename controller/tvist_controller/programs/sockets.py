@@ -1,6 +1,6 @@
 """Sockets of programs: received data and waiting readers.
 
-The host has the network: it takes orders after the programs' turns and reports `SocketNews` before a tick.
+The host has the network: it takes orders after the programs' turns and reports `SocketEvent` before a tick.
 The journal contains the news, so that a replay gets the same bytes. A cell's gripper is simulated; it answers
 a tick later.
 """
@@ -26,7 +26,7 @@ Take = Callable[[bytes], tuple[T, int] | None]
 """Returns the value at the beginning of the received bytes and its length; None while incomplete."""
 
 
-class SocketNews(NamedTuple):
+class SocketEvent(NamedTuple):
     """An event of a socket."""
 
     number: int
@@ -36,7 +36,7 @@ class SocketNews(NamedTuple):
     """Received data."""
 
     @classmethod
-    def of(cls, entry: Entry) -> "SocketNews":
+    def of(cls, entry: Entry) -> "SocketEvent":
         """Return the news in a journal entry."""
         if entry.socket is None or entry.change is None:
             raise ValueError(
@@ -104,9 +104,9 @@ class SocketPorts:
     Later events reach the host by `Host.socket`.
     """
 
-    def carry_out(self, orders: Sequence[SocketOrder]) -> Sequence[SocketNews]:
+    def carry_out(self, orders: Sequence[SocketOrder]) -> Sequence[SocketEvent]:
         """Carry out orders without blocking; return news known at once, which count after this tick."""
-        return [SocketNews(order.socket, "failed") for order in orders if isinstance(order, Open)]
+        return [SocketEvent(order.socket, "failed") for order in orders if isinstance(order, Open)]
 
 
 @dataclass
@@ -143,7 +143,7 @@ class Sockets:
         self._answers: list[tuple[_Socket, bytes]] = []  # gripper answers for the next tick
         self._waits: dict[int, bool] = {}  # present waits, and whether the wall time of each has also expired
 
-    def hear(self, news: SocketNews) -> None:
+    def hear(self, news: SocketEvent) -> None:
         """Take news about a socket or a wait."""
         if news.change == "expired":
             if news.number in self._waits:

@@ -3,7 +3,7 @@
 from inspect import getdoc
 
 from tvist_controller.programs.functions.unsimulated import SUBJECTS
-from tvist_controller.programs.library import FAMILIES, known_signatures
+from tvist_controller.programs.library import FUNCTION_GROUPS, known_signatures
 from tvist_protocol.pages import markdown_table
 from tvist_urscript import METHOD, REQUIRED, Signature, signatures
 
@@ -29,7 +29,7 @@ of postures."""
 def page() -> str:
     """Return the reference page of all functions."""
     parts = [HEAD]
-    for functions in FAMILIES:
+    for functions in FUNCTION_GROUPS:
         rows = [
             (f"`{_call(name, one)}`", "waits" if one.blocks else "", _what(functions, name))
             for name, one in signatures(functions).items()

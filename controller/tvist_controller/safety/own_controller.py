@@ -11,7 +11,7 @@ from tvist_controller.refusal import invalid, wrong_mode
 from tvist_controller.safety.robot_modes import RobotModes
 from tvist_controller.safety.safety_control import SafetyControl
 from tvist_controller.setup import payload_of
-from tvist_plant.plant import PlantError, RealArm, Sight
+from tvist_plant.plant import PlantError, RealArm, RobotReport
 from tvist_protocol.commands import Command, SetPayload
 from tvist_protocol.io import Io, SetIo, SimulationSetInputs
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
@@ -30,40 +30,40 @@ class RemoteStatus:
 
     def __init__(self, plant: RealArm, peripherals: Peripherals, emit: Emit) -> None:
         self._plant, self._peripherals, self._emit = plant, peripherals, emit
-        self._sight: Sight | None = None
+        self._report: RobotReport | None = None
         self._io: tuple[object, ...] = ()
 
     @property
     def missed(self) -> int:
         """Number of lost cycles."""
-        return 0 if self._sight is None else self._sight.missed
+        return 0 if self._report is None else self._report.missed
 
-    def tell(self, sight: Sight, before: Sight | None) -> None:
+    def tell(self, report: RobotReport, before: RobotReport | None) -> None:
         """Emit a report's warnings and take over its tool; `before` is the previous report."""
-        for why in sight.told:
+        for why in report.told:
             self._emit("warning", why=why)
-        if sight.tool is not None and (before is None or sight.tool != before.tool):
-            self._peripherals.set_tcp(sight.tool)
-        io = sight.payload, sight.tool, sight.slider, sight.inputs, sight.outputs
+        if report.tool is not None and (before is None or report.tool != before.tool):
+            self._peripherals.set_tcp(report.tool)
+        io = report.payload, report.tool, report.slider, report.inputs, report.outputs
         if io != self._io:
             self._io, self._peripherals.changed = io, True
 
     def declared(self, payload: Payload) -> Payload:
         """Return the payload set on the robot, or `payload` if not reported."""
-        if self._sight is None or self._sight.payload is None:
+        if self._report is None or self._report.payload is None:
             return payload
-        return payload_of(self._sight.payload)
+        return payload_of(self._report.payload)
 
     def io(self, io: Io, *, force: bool) -> Io:
         """Return `io` with the robot's own values, and its tool force if wanted."""
-        if (sight := self._sight) is None:
+        if (report := self._report) is None:
             return io
         given = {
             "payload": self.declared(io.payload),
-            "target_speed_fraction": io.target_speed_fraction if sight.slider is None else sight.slider,
-            "actual_digital_input_bits": sight.inputs,
-            "actual_digital_output_bits": sight.outputs,
-            "actual_TCP_force": list(sight.force) if force and sight.force is not None else None,
+            "target_speed_fraction": io.target_speed_fraction if report.slider is None else report.slider,
+            "actual_digital_input_bits": report.inputs,
+            "actual_digital_output_bits": report.outputs,
+            "actual_TCP_force": list(report.force) if force and report.force is not None else None,
         }
         return msgspec.structs.replace(io, **given)
 
@@ -80,21 +80,21 @@ class Watching(RemoteStatus):
 
     def look(self) -> int | None:
         """Take the next report and return its tick; None without one. `tell_cycle` then emits the changes."""
-        self._before = self._sight
+        self._before = self._report
         try:
-            self._sight = self._plant.sight()
+            self._report = self._plant.cycle_report()
         except PlantError as error:
             self._emit("warning", why=str(error))
             return None
-        return self._sight.tick
+        return self._report.tick
 
     def tell_cycle(self) -> None:
         """Emit the changes of the present cycle."""
-        sight, before = self._sight, self._before
-        if sight is None or sight is before:
+        report, before = self._report, self._before
+        if report is None or report is before:
             return
-        self.tell(sight, before)
-        _, safety, _ = self._modes.now = sight.modes
+        self.tell(report, before)
+        _, safety, _ = self._modes.now = report.modes
         if before is not None and safety != before.modes[1]:
             name = SafetyMode(safety).name if safety in set(SafetyMode) else safety
             why = f"the robot reports safety_mode {name}"
@@ -103,13 +103,13 @@ class Watching(RemoteStatus):
 
     def sample(self) -> Sample:
         """Return the signals of the present cycle."""
-        sight = self._sight
-        return self._cycle.sample if sight is None else self._cycle.follow(sight.target, sight.measured)
+        report = self._report
+        return self._cycle.sample if report is None else self._cycle.follow(report.target, report.measured)
 
     @property
     def speed(self) -> float:
         """Fraction of the programmed speed [-]."""
-        return 0.0 if self._sight is None else self._sight.speed
+        return 0.0 if self._report is None else self._report.speed
 
 
 class Supervision(RemoteStatus):
@@ -128,15 +128,15 @@ class Supervision(RemoteStatus):
 
     def look(self) -> None:
         """Take the reports since the last tick; call before each tick."""
-        before, sight = self._sight, self._plant.seen()
-        self._sight = sight
-        self.tell(sight, before)
-        if before is None or sight.slider != before.slider:
-            self._scale(sight)
-        if before is None or sight.modes[1] != before.modes[1]:
-            self._obey(sight.modes[1])
-        if before is not None and sight.payload != before.payload and sight.payload is not None:
-            why = f"another payload was set on the robot, {sight.payload.mass:.3g} kg: power off and on to check it"
+        before, report = self._report, self._plant.latest_report()
+        self._report = report
+        self.tell(report, before)
+        if before is None or report.slider != before.slider:
+            self._scale(report)
+        if before is None or report.modes[1] != before.modes[1]:
+            self._obey(report.modes[1])
+        if before is not None and report.payload != before.payload and report.payload is not None:
+            why = f"another payload was set on the robot, {report.payload.mass:.3g} kg: power off and on to check it"
             self._emit("warning", why=why)
 
     def check(self, command: Command) -> None:
@@ -145,7 +145,7 @@ class Supervision(RemoteStatus):
             raise wrong_mode(
                 "inputs and outputs are those of the robot, to which only set-points are sent: switch them there"
             )
-        told = None if self._sight is None else self._sight.payload
+        told = None if self._report is None else self._report.payload
         if isinstance(command, SetPayload) and told is not None and abs(command.mass - told.mass) > SAME_MASS:
             must = f"{told.mass:.3g} kg, as set on the robot; to change it, set it there first"
             raise invalid("mass", f"{command.mass:.3g} kg", must, code="wrong_mode")
@@ -155,8 +155,8 @@ class Supervision(RemoteStatus):
         kept = {name: getattr(io, name) for name in ("payload", "target_speed_fraction")}
         return msgspec.structs.replace(super().io(io, force=force), **kept)
 
-    def _scale(self, sight: Sight) -> None:
-        slider, motions = 1.0 if sight.slider is None else sight.slider, self._motion.motions
+    def _scale(self, report: RobotReport) -> None:
+        slider, motions = 1.0 if report.slider is None else report.slider, self._motion.motions
         before = motions.wanted_speed
         motions.scale(slider)
         if motions.wanted_speed != before:

@@ -13,7 +13,7 @@ from tvist_controller.trajectory.base import (
 from tvist_controller.trajectory.compliant import Compliant, ForceTask
 from tvist_controller.trajectory.guided import Guided, ServoFollower, StuckError
 from tvist_controller.trajectory.motion import DoubleS, PlannedMotion, at_least, quickest_motion
-from tvist_controller.trajectory.speed import Speed
+from tvist_controller.trajectory.speed import VelocityFollower
 from tvist_controller.trajectory.stop import JointStop, PathStop, SlowedStop
 from tvist_controller.trajectory.stream import SetpointStream
 
@@ -38,9 +38,9 @@ __all__ = [
     "ServoFollower",
     "SetpointStream",
     "SlowedStop",
-    "Speed",
     "StuckError",
     "Trajectory",
+    "VelocityFollower",
     "at_least",
     "quickest_motion",
 ]

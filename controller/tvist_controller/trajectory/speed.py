@@ -74,7 +74,7 @@ def speed_step(  # noqa: C901, PLR0912  a kernel: its branches are loops
     velocities: Floats,  # at the beginning and the end, in the trajectory's own time, shape (2, 6) or (2, n)
     ranges: Floats,  # least and largest change of the joints' step, and largest step, shape (3, n) [rad]
     change: Floats,  # largest change of the velocity, shape (6,) or (n,)
-    given: Floats,  # present and wanted rate [-], the joints' limits, `Speed._lag`, tick [s]
+    given: Floats,  # present and wanted rate [-], the joints' limits, `VelocityFollower._lag`, tick [s]
     place: Floats,  # present rotation and position of the tool, shape (4, 3)
     goal: Floats,  # result: rotation and position of the tool a tick later
     q: Floats,  # result: positions of the joints a tick later, shape (n,) [rad]
@@ -146,7 +146,7 @@ LOST_SHARE = 1e-3
 of rounding and nearly singular postures [-]."""
 
 
-class Speed(Guided):
+class VelocityFollower(Guided):
     """Accelerates joints or tool to a velocity and keeps it.
 
     In the trajectory's own time, velocity u approaches its goal with constant acceleration, all entries in phase. The

@@ -14,7 +14,7 @@ CURVED_SHARE = 0.5
 MAX_WIDENINGS = 12  # number of times a stop's range is widened before the whole rest of the curve is used
 
 
-class Bends(NamedTuple):
+class DerivativeBounds(NamedTuple):
     """Bounds of derivatives with respect to s on a part of a curve."""
 
     slope: Floats  # |dq/ds| of each joint, shape (n,) [rad per unit of s]
@@ -134,7 +134,7 @@ class SplineCurve(Path):
         q, slope, second, _ = self._evaluate(s)
         return q, slope, second
 
-    def bends_within(self, start: float, end: float) -> Bends:
+    def bends_within(self, start: float, end: float) -> DerivativeBounds:
         """Return bounds of the derivatives on the part between two parameters."""
         last = len(self._slope)
         low = min(max(int(np.searchsorted(self._knots, start, side="right")) - 1, 0), last - 1)
@@ -187,15 +187,15 @@ class SplineCurve(Path):
         evaluate(self._knots, self._coefficients, np.ascontiguousarray(s), out)
         return out
 
-    def _bends(self, low: int, high: int) -> Bends:
-        return Bends(
+    def _bends(self, low: int, high: int) -> DerivativeBounds:
+        return DerivativeBounds(
             self._slope[low:high].max(axis=0),
             float(self._second[low:high].max()),
             float(self._third[low:high].max()),
         )
 
 
-def kept_by(bends: Bends, limits: MotionLimits, velocity: float) -> MotionLimits | None:
+def kept_by(bends: DerivativeBounds, limits: MotionLimits, velocity: float) -> MotionLimits | None:
     """Return parameter limits that keep joint limits on part of a curve; `acceleration` has room for jerk."""
     slope, second, third = float(bends.slope.max()), bends.second, bends.third
     acceleration = (limits.acceleration - second * velocity**2) / slope

@@ -10,7 +10,7 @@ from tvist_controller.trajectory.base import BrakingForecast, Floats, Path, Traj
 from tvist_plant.plant import PERIOD
 
 
-class Slowing(Trajectory):
+class StopTrajectory(Trajectory):
     """Shortest way to rest of joints or entries of a path's parameter within acceleration and jerk limits."""
 
     def __init__(
@@ -57,7 +57,7 @@ class Slowing(Trajectory):
         return self._ticks * PERIOD >= self.duration
 
 
-class JointStop(Slowing):
+class JointStop(StopTrajectory):
     """Shortest stop within limits of acceleration and jerk; each joint stops as soon as it can."""
 
     def __init__(self, q: Floats, qd: Floats, qdd: Floats, *, acceleration: float, jerk: float) -> None:
@@ -79,7 +79,7 @@ class JointStop(Slowing):
         return self.at(self._ticks * PERIOD)[1]
 
 
-class PathStop(Slowing):
+class PathStop(StopTrajectory):
     """Shortest stop along a path within limits of its parameter's acceleration and jerk.
 
     Samples are the parameter, so the stop stays on the path. No other motion on the path from the same state,

@@ -33,8 +33,8 @@ from tvist_lab.identification.ring_downs import (
     IdentificationError,
     Log,
     Progress,
+    RingDownData,
     RingDownStop,
-    Ringing,
     stops_of,
     unused,
 )
@@ -68,7 +68,7 @@ class ModeErrors:
 
 
 @dataclass(frozen=True)
-class Found:
+class CalibrationResult:
     """A calibration from ring-downs, and its accuracy."""
 
     calibration: Calibration
@@ -85,7 +85,7 @@ class Found:
     @property
     def used(self) -> int:
         """Number of stops that were used."""
-        return sum(stop.ringing is not None for stop in self.stops)
+        return sum(stop.ring_down is not None for stop in self.stops)
 
     @property
     def modes(self) -> int:
@@ -112,27 +112,28 @@ class Found:
 
 def calibrate(
     description: RobotDescription, measured: RingDownLogs, *, name: str, command: str, progress: Progress
-) -> Found:
+) -> CalibrationResult:
     """Fit springs and drives to all ring-downs that agree, and polynomials if they cover the workspace.
 
     The search starts at the springs and drives of the robot file; `command` is the typed command line. Raises
     IdentificationError if too few stops are usable or they disagree, RecordingError if a log is unusable.
     """
-    stops, arm, ringings = agreeing(description, measured.logs, progress)
+    stops, arm, ring_downs = agreeing(description, measured.logs, progress)
     progress("fitting springs and drives")
-    fit = fit_from_many(arm, ringings)
-    left, jackknife = cross_validate(arm, ringings, fit)
-    forecast = ModeForecast(arm, fit, fit.covariance + jackknife, of_masses(arm, ringings, fit)).widened(left)
+    fit = fit_from_many(arm, ring_downs)
+    left, jackknife = cross_validate(arm, ring_downs, fit)
+    masses = of_masses(arm, ring_downs, fit)
+    forecast = ModeForecast(arm, fit, fit.covariance + jackknife, masses).widened(left)
     deviations = np.sqrt(
         np.maximum(np.diag(fit.covariance), np.diag(jackknife)) + np.sum(forecast.moved**2, axis=1)
     )
     first = np.array(
-        [np.ravel(describe(lowest_poles(fit.drivetrain, arm.mass(r.q, r.payload))[:1])) for r in ringings]
+        [np.ravel(describe(lowest_poles(fit.drivetrain, arm.mass(r.q, r.payload))[:1])) for r in ring_downs]
     )
     (low_f, low_z), (high_f, high_z) = first.min(axis=0).tolist(), first.max(axis=0).tolist()
     f_d_min, zeta_max = mode_range(description, fit.drivetrain)
     unseen = _errors(left)
-    ringing = [stop.ringing for stop in stops if stop.ringing is not None]
+    used = [stop.ring_down for stop in stops if stop.ring_down is not None]
     arms = {getattr(log.recording.info, "arm", None) for log in measured.logs}
     calibration = Calibration(
         name=name,
@@ -147,9 +148,9 @@ def calibrate(
                 RingDownFit(
                     q=tuple(r.q.tolist()), payload=r.payload, rms=r.rms(), residual_to_noise=float(ratio)
                 )
-                for r, ratio in zip(ringings, fit.residual_to_noise, strict=True)
+                for r, ratio in zip(ring_downs, fit.residual_to_noise, strict=True)
             ),
-            noise=float(np.sqrt(np.mean([r.noise**2 for r in ringings]))),
+            noise=float(np.sqrt(np.mean([r.noise**2 for r in ring_downs]))),
             residual_to_noise=float(np.sqrt(np.mean(fit.residual_to_noise**2))),
             cross_validated_f_d_percent=tuple(None if mode is None else mode.f_d for mode in unseen),
             cross_validated_zeta_percent=tuple(None if mode is None else mode.zeta for mode in unseen),
@@ -160,15 +161,15 @@ def calibrate(
             command=command[:500],
             version=version("tvist"),
             seed=measured.seed,
-            configurations=len({one.q.tobytes() for one in ringing}),
-            ring_downs=len(ringing),
-            rejected=len(stops) - len(ringing) + measured.refused,
+            configurations=len({one.q.tobytes() for one in used}),
+            ring_downs=len(used),
+            rejected=len(stops) - len(used) + measured.refused,
             measured_f_d_range=(low_f, high_f),
             measured_zeta_range=(low_z, high_z),
             arm=arms.pop() if len(arms) == 1 else None,
         ),
     )
-    every = [replace(one, softening=ringings[0].softening) for one in ringing]
+    every = [replace(one, softening=ring_downs[0].softening) for one in used]
     calibration, no_polynomial = _with_polynomials(calibration, arm, every, fit)
     progress("looking for moves that would tell more")
     places = identified(description).spread(PLACES, description.joints, 1)
@@ -176,27 +177,27 @@ def calibrate(
     known = [forecast.at(q, heaviest) for q in places]
     half = np.array([one.f_d_percent[0] for one in known])
     worst = int(np.argmax(half))
-    return Found(
+    return CalibrationResult(
         calibration=calibration,
         stops=tuple(stops),
         left=tuple(left),
         forecast=forecast,
         known_percent=100.0 * float(np.mean(half <= KNOWN)),
         least_known=(places[worst], known[worst]),
-        proposals=more_jogs(forecast, ringings[-1]),
+        proposals=more_jogs(forecast, ring_downs[-1]),
         no_polynomial=no_polynomial,
     )
 
 
 def agreeing(
     description: RobotDescription, logs: Sequence[Log], progress: Progress
-) -> tuple[list[RingDownStop], ArmModes, list[Ringing]]:
+) -> tuple[list[RingDownStop], ArmModes, list[RingDownData]]:
     """Return all stops, the arm with their payloads, and at most `MAX_RING_DOWNS` ring-downs that agree."""
     # Set in the ring-downs the gear hysteresis that explains all of them best.
     check_logs(description, logs)
     progress("looking for stops")
     stops, payloads = stops_of(logs)
-    usable = [number for number, stop in enumerate(stops) if stop.ringing is not None]
+    usable = [number for number, stop in enumerate(stops) if stop.ring_down is not None]
     if len(usable) < MIN_RING_DOWNS:
         why = "; ".join(f"{count}: {reason}" for reason, count in unused(stops).items())
         raise IdentificationError(
@@ -208,11 +209,11 @@ def agreeing(
     arm = ArmModes(description, payloads)
     count = min(len(usable), MAX_RING_DOWNS)
     fitted = [usable[k * len(usable) // count] for k in range(count)]
-    ringings = softened(arm, [ringing for number in fitted if (ringing := stops[number].ringing) is not None])
-    wrong = contradicting(arm, ringings)
+    ring_downs = softened(arm, [one for number in fitted if (one := stops[number].ring_down) is not None])
+    wrong = contradicting(arm, ring_downs)
     for number in wrong:
-        stops[fitted[number]] = replace(stops[fitted[number]], ringing=None, reason=CONTRADICTS)
-    return stops, arm, [ringing for number, ringing in enumerate(ringings) if number not in wrong]
+        stops[fitted[number]] = replace(stops[fitted[number]], ring_down=None, reason=CONTRADICTS)
+    return stops, arm, [ring_down for number, ring_down in enumerate(ring_downs) if number not in wrong]
 
 
 def check_logs(description: RobotDescription, logs: Sequence[Log]) -> None:
@@ -230,7 +231,7 @@ def check_logs(description: RobotDescription, logs: Sequence[Log]) -> None:
             )
 
 
-def more_jogs(forecast: ModeForecast, last: Ringing) -> tuple[Jog, ...]:
+def more_jogs(forecast: ModeForecast, last: RingDownData) -> tuple[Jog, ...]:
     """Propose jogs that add most information; the first way starts where the last ring-down was recorded."""
     arm = forecast.arm
     counts = [PROPOSED if number == last.payload else 0 for number in range(len(arm.payloads))]
@@ -239,13 +240,13 @@ def more_jogs(forecast: ModeForecast, last: Ringing) -> tuple[Jog, ...]:
 
 
 def _with_polynomials(
-    calibration: Calibration, arm: ArmModes, ringings: Sequence[Ringing], springs: ModalFit
+    calibration: Calibration, arm: ArmModes, ring_downs: Sequence[RingDownData], springs: ModalFit
 ) -> tuple[Calibration, str]:
     """Add polynomials for the payload with most ring-downs; if they do not fit well, return the reason."""
-    counted = Counter(r.payload for r in ringings)
+    counted = Counter(r.payload for r in ring_downs)
     payload = max(counted, key=lambda number: (counted[number], arm.payloads[number].mass))
     try:
-        model, deviations = polynomials(arm, [r for r in ringings if r.payload == payload], springs)
+        model, deviations = polynomials(arm, [r for r in ring_downs if r.payload == payload], springs)
     except FitError as error:
         return calibration, f"with {arm.payloads[payload].mass:g} kg, {error}"
     provenance = with_fields(calibration.provenance, **deviations)

@@ -13,7 +13,7 @@ from scipy.linalg import expm
 
 from tvist_controller.api.line import CollisionModel, JointLine, MotionLimits, body, quickest_motion
 from tvist_lab.identification.modal_fit import information
-from tvist_lab.identification.ring_downs import BEGINS, LONGEST, Ringing
+from tvist_lab.identification.ring_downs import BEGINS, LONGEST, RingDownData
 from tvist_lab.identification.unknowns import ArmModes
 from tvist_lab.recordings import Floats
 from tvist_lab.workspace import identified
@@ -90,7 +90,7 @@ def most_informative(
     return chosen
 
 
-def predicted(arm: ArmModes, q: Floats, payload: int, logarithms: Floats | None = None) -> Ringing:
+def predicted(arm: ArmModes, q: Floats, payload: int, logarithms: Floats | None = None) -> RingDownData:
     """Predict the ring-down after a jog; the arm is linearized at the jog's end, its feed-forward perfect."""
     flexible, mass = arm.flexible[payload], arm.mass(q, payload)
     drivetrain = arm.drivetrain(arm.guess if logarithms is None else logarithms)
@@ -116,7 +116,7 @@ def predicted(arm: ArmModes, q: Floats, payload: int, logarithms: Floats | None 
     ]
     force = np.array(rates[-SAMPLES:]) @ jacobian.T
     time: Floats = PERIOD * np.arange(len(force), dtype=np.float64)
-    return Ringing(q, payload, force, NOISE, time)
+    return RingDownData(q, payload, force, NOISE, time)
 
 
 def _pushes(rows: Floats, rigid: Floats, jog: Floats) -> Floats:

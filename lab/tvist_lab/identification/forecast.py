@@ -14,7 +14,7 @@ from tvist_lab.identification.modal_fit import (
     lowest_poles,
     own_poles_near,
 )
-from tvist_lab.identification.ring_downs import IdentificationError, Ringing
+from tvist_lab.identification.ring_downs import IdentificationError, RingDownData
 from tvist_lab.identification.unknowns import Z_95, ArmModes
 from tvist_lab.recordings import Floats
 
@@ -34,7 +34,7 @@ FOLDS = 10  # number of parts into which more configurations are divided
 class LeftOut:
     """A ring-down, and the modes at its configuration from a fit without it."""
 
-    ringing: Ringing
+    ring_down: RingDownData
     f_d: Floats  # shape (k,) [Hz]
     zeta: Floats  # shape (k,) [-]
     own: OwnPoles  # the same modes fitted to the ring-down alone
@@ -88,7 +88,7 @@ class ModeForecast:
         """Return a forecast with errors enlarged, if necessary, to those at ring-downs left out of fits."""
         squares: list[tuple[float, float]] = []
         for one in left:
-            known = self.at(one.ringing.q, one.ringing.payload, MODES)
+            known = self.at(one.ring_down.q, one.ring_down.payload, MODES)
             for k in (k for k in one.own.certain if k < len(known.f_d)):
                 f_d = np.log(one.f_d[k] / one.own.f_d[k]) ** 2
                 zeta = np.log(one.zeta[k] / one.own.zeta[k]) ** 2
@@ -104,20 +104,20 @@ class ModeForecast:
         return replace(self, wider=(max(f_d, 1.0), max(zeta, 1.0)))
 
 
-def contradicting(arm: ArmModes, ringings: Sequence[Ringing]) -> list[int]:
+def contradicting(arm: ArmModes, ring_downs: Sequence[RingDownData]) -> list[int]:
     """Find ring-downs that no springs and drives can explain together with the others."""
     # A wrong ring-down also spoils the fit of the others. So leave out each of the worst explained ones in
     # turn, remove the one without which the fit is best, and repeat until the rest agree.
-    fit = fit_modal(arm, ringings)
-    rest = list(range(len(ringings)))
+    fit = fit_modal(arm, ring_downs)
+    rest = list(range(len(ring_downs)))
     guilty: list[int] = []
-    while len(guilty) <= len(ringings) // GUILTY:
-        explained = {number: own_poles_near(arm, ringings[number], fit) for number in rest}
+    while len(guilty) <= len(ring_downs) // GUILTY:
+        explained = {number: own_poles_near(arm, ring_downs[number], fit) for number in rest}
         worst = sorted(rest, key=lambda number: -explained[number].share)[:SUSPECTS]
         if all(own.share < CONTRADICTION or own.significance < SIGNIFICANT for own in explained.values()):
             return sorted(guilty)
         without = {
-            number: fit_modal(arm, [ringings[other] for other in rest if other != number], fit.logarithms)
+            number: fit_modal(arm, [ring_downs[other] for other in rest if other != number], fit.logarithms)
             for number in worst
         }
         removed = min(worst, key=lambda number: without[number].cost)
@@ -125,27 +125,29 @@ def contradicting(arm: ArmModes, ringings: Sequence[Ringing]) -> list[int]:
         rest.remove(removed)
         fit = without[removed]
     raise IdentificationError(
-        f"the {len(ringings)} ring-downs contradict each other: no springs and drives explain them together. Was "
+        f"the {len(ring_downs)} ring-downs contradict each other: no springs and drives explain them together. Was "
         "the payload the declared one each time, is the robot the one of the file, and did nothing shake it?"
     )
 
 
-def cross_validate(arm: ArmModes, ringings: Sequence[Ringing], fit: ModalFit) -> tuple[list[LeftOut], Floats]:
+def cross_validate(
+    arm: ArmModes, ring_downs: Sequence[RingDownData], fit: ModalFit
+) -> tuple[list[LeftOut], Floats]:
     """Fit without each configuration in turn; if there are many, without each of `FOLDS` parts of them.
 
     Also return the jackknife covariance of the parameters' logarithms, shape (P, P), which includes model
     errors as well as noise.
     """
-    places = {place: number for number, place in enumerate(dict.fromkeys(r.q.tobytes() for r in ringings))}
+    places = {place: number for number, place in enumerate(dict.fromkeys(r.q.tobytes() for r in ring_downs))}
     folds = len(places) if len(places) <= SINGLY else FOLDS
     logarithms, left = [], []
     for fold in range(folds):
-        out = [r for r in ringings if places[r.q.tobytes()] % folds == fold]
-        others = [r for r in ringings if places[r.q.tobytes()] % folds != fold]
+        out = [r for r in ring_downs if places[r.q.tobytes()] % folds == fold]
+        others = [r for r in ring_downs if places[r.q.tobytes()] % folds != fold]
         unseen = fit_modal(arm, others, fit.logarithms)
         logarithms.append(unseen.logarithms)
-        for ringing in out:
-            poles = lowest_poles(unseen.drivetrain, arm.mass(ringing.q, ringing.payload))
-            left.append(LeftOut(ringing, *describe(poles), own_poles_near(arm, ringing, unseen)))
+        for ring_down in out:
+            poles = lowest_poles(unseen.drivetrain, arm.mass(ring_down.q, ring_down.payload))
+            left.append(LeftOut(ring_down, *describe(poles), own_poles_near(arm, ring_down, unseen)))
     apart = np.array(logarithms) - np.mean(logarithms, axis=0)
     return left, (folds - 1) / folds * apart.T @ apart

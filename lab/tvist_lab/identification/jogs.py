@@ -283,7 +283,7 @@ async def _jogs(
         if recording is None:
             continue
         logs.append(Log(f"jog {number}", replace(recording, info=info), payload, begins, inexact, driven))
-        heard = stops_of(logs[-1:])[0][-1].ringing
+        heard = stops_of(logs[-1:])[0][-1].ring_down
         loud = 0.0 if heard is None else heard.rms(LATER)
         share = float(np.clip(share * np.sqrt(LOUD / max(loud, 1e-3)), GENTLEST, 1.0))
     return logs

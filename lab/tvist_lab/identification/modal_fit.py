@@ -22,7 +22,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import gaussian_filter1d
 from scipy.optimize import least_squares
 
-from tvist_lab.identification.ring_downs import Ringing
+from tvist_lab.identification.ring_downs import RingDownData
 from tvist_lab.identification.unknowns import FURTHEST, ArmModes
 from tvist_lab.metrics import SLOW_POLE
 from tvist_lab.recordings import Floats
@@ -65,20 +65,20 @@ class ModalFit:
 class _Signal:
     """One ring-down with its mass matrix; amplitudes are eliminated by projection."""
 
-    def __init__(self, arm: ArmModes, ringing: Ringing) -> None:
-        self.mass, self.force = arm.mass(ringing.q, ringing.payload), ringing.force
-        self.noise = float(np.hypot(ringing.noise, ringing.inexact))
-        self.time = ringing.time
-        moved = cumulative_trapezoid(_amplitude(ringing, self.time), self.time, initial=0.0)
-        self._lost = ringing.softening * moved
-        still = np.exp(np.outer(self.time, np.array(ringing.driven, dtype=complex)))
+    def __init__(self, arm: ArmModes, ring_down: RingDownData) -> None:
+        self.mass, self.force = arm.mass(ring_down.q, ring_down.payload), ring_down.force
+        self.noise = float(np.hypot(ring_down.noise, ring_down.inexact))
+        self.time = ring_down.time
+        moved = cumulative_trapezoid(_amplitude(ring_down, self.time), self.time, initial=0.0)
+        self._lost = ring_down.softening * moved
+        still = np.exp(np.outer(self.time, np.array(ring_down.driven, dtype=complex)))
         self._always = np.column_stack(
             [np.exp(-SLOW_POLE * self.time), np.ones(len(self.force)), still.real, still.imag]
         )
 
     def _columns(self, poles: Complex) -> Floats:
-        ringing = np.exp(np.outer(self.time, poles) - np.outer(self._lost, RAYLEIGH / np.abs(poles)))
-        return np.column_stack([ringing.real, ringing.imag, self._always])
+        waves = np.exp(np.outer(self.time, poles) - np.outer(self._lost, RAYLEIGH / np.abs(poles)))
+        return np.column_stack([waves.real, waves.imag, self._always])
 
     def amplitudes(self, poles: Complex) -> Floats:
         """Return the initial length of each mode's vector of amplitudes [m/s²]."""
@@ -112,17 +112,17 @@ def lowest_poles(drivetrain: Drivetrain, mass: Floats) -> Complex:
     return drivetrain.poles(mass)[0][:MODES]
 
 
-def _amplitude(ringing: Ringing, time: Floats) -> Floats:
+def _amplitude(ring_down: RingDownData, time: Floats) -> Floats:
     """Return the amplitude of the tool's acceleration without the noise, shape (T,) [m/s²]."""
-    swinging = np.sum((ringing.force - ringing.force.mean(axis=0)) ** 2, axis=1)
+    swinging = np.sum((ring_down.force - ring_down.force.mean(axis=0)) ** 2, axis=1)
     width = SMOOTHED / float(np.median(np.diff(time)))
-    power = gaussian_filter1d(swinging, width, mode="nearest") - 3.0 * ringing.noise**2
+    power = gaussian_filter1d(swinging, width, mode="nearest") - 3.0 * ring_down.noise**2
     return np.asarray(np.sqrt(2.0 * np.maximum(power, 0.0)))
 
 
-def fit_modal(arm: ArmModes, ringings: Sequence[Ringing], start: Floats | None = None) -> ModalFit:
+def fit_modal(arm: ArmModes, ring_downs: Sequence[RingDownData], start: Floats | None = None) -> ModalFit:
     """Estimate the parameters, starting from the guess or from `start`."""
-    signals = [_Signal(arm, r) for r in ringings]
+    signals = [_Signal(arm, r) for r in ring_downs]
 
     def residual(logarithms: Floats) -> Floats:
         drivetrain = arm.drivetrain(logarithms)
@@ -159,33 +159,33 @@ def fit_modal(arm: ArmModes, ringings: Sequence[Ringing], start: Floats | None =
     )
 
 
-def fit_from_many(arm: ArmModes, ringings: Sequence[Ringing]) -> ModalFit:
+def fit_from_many(arm: ArmModes, ring_downs: Sequence[RingDownData]) -> ModalFit:
     """Return the best fit from several starting points."""
     # Parameters can compensate each other, so several sets may explain ring-downs equally well. A parameter
     # that differs between sets is uncertain: their spread, weighted by likelihood, adds to the deviations.
     rng = np.random.default_rng(0)
     starts = [arm.guess, *(arm.guess + rng.normal(0.0, SPREAD, (STARTS - 1, len(arm.guess))))]
-    fits = [fit_modal(arm, ringings, start) for start in starts]
+    fits = [fit_modal(arm, ring_downs, start) for start in starts]
     best = min(fits, key=lambda fit: fit.cost)
     likely = np.array([np.exp(best.cost - fit.cost) for fit in fits])
     apart = np.array([fit.logarithms - best.logarithms for fit in fits])
     return replace(best, covariance=best.covariance + np.diag(np.max(likely[:, None] * apart**2, axis=0)))
 
 
-def softened(arm: ArmModes, ringings: Sequence[Ringing]) -> list[Ringing]:
+def softened(arm: ArmModes, ring_downs: Sequence[RingDownData]) -> list[RingDownData]:
     """Return the ring-downs with `softening` set to the hysteresis that explains all of them best."""
-    fits = {share: fit_modal(arm, [replace(r, softening=share) for r in ringings]) for share in SOFTENINGS}
+    fits = {share: fit_modal(arm, [replace(r, softening=share) for r in ring_downs]) for share in SOFTENINGS}
     best = min(fits, key=lambda share: fits[share].cost + 0.5 * (share / SOFTENINGS[-1]) ** 2)
-    return [replace(r, softening=best) for r in ringings]
+    return [replace(r, softening=best) for r in ring_downs]
 
 
-def of_masses(arm: ArmModes, ringings: Sequence[Ringing], fit: ModalFit) -> Floats:
+def of_masses(arm: ArmModes, ring_downs: Sequence[RingDownData], fit: ModalFit) -> Floats:
     """Return the shift of the fitted logarithms if each mass deviates as assumed, shape (P, masses)."""
     # Masses are not fitted, since they are known better than a fit could find them. The shift is of first
     # order.
-    signals = [_Signal(arm, r) for r in ringings]
+    signals = [_Signal(arm, r) for r in ring_downs]
     changes, heavier = [], []
-    for signal, r in zip(signals, ringings, strict=True):
+    for signal, r in zip(signals, ring_downs, strict=True):
         changes.append(signal.slopes(arm, fit.logarithms))
         here, masses = signal.left_with(fit.drivetrain), arm.heavier(r.q, r.payload)
         others = [signal.left(lowest_poles(fit.drivetrain, mass)) - here for mass in masses]
@@ -195,9 +195,9 @@ def of_masses(arm: ArmModes, ringings: Sequence[Ringing], fit: ModalFit) -> Floa
     return np.asarray(-np.linalg.solve(knowledge, change.T @ np.vstack(heavier)))
 
 
-def information(arm: ArmModes, ringing: Ringing, logarithms: Floats) -> Floats:
+def information(arm: ArmModes, ring_down: RingDownData, logarithms: Floats) -> Floats:
     """Return a ring-down's information about the parameters: inverse of their covariance, shape (P, P)."""
-    change = _Signal(arm, ringing).slopes(arm, logarithms)
+    change = _Signal(arm, ring_down).slopes(arm, logarithms)
     return np.asarray(change.T @ change)
 
 
@@ -221,9 +221,9 @@ class OwnPoles:
         return [k for k, (f_d, zeta) in enumerate(errors) if f_d < CERTAIN[0] and zeta < CERTAIN[1]]
 
 
-def own_poles(arm: ArmModes, ringing: Ringing, poles: Complex) -> OwnPoles:
+def own_poles(arm: ArmModes, ring_down: RingDownData, poles: Complex) -> OwnPoles:
     """Fit poles to one ring-down alone, starting at given poles; springs and drives do not constrain them."""
-    signal = _Signal(arm, ringing)
+    signal = _Signal(arm, ring_down)
     f_d, zeta = describe(poles)
     start = np.log(np.concatenate([f_d, np.clip(zeta, 1e-4, 0.95)]))
 
@@ -248,9 +248,9 @@ def own_poles(arm: ArmModes, ringing: Ringing, poles: Complex) -> OwnPoles:
     )
 
 
-def own_poles_near(arm: ArmModes, ringing: Ringing, fit: ModalFit) -> OwnPoles:
+def own_poles_near(arm: ArmModes, ring_down: RingDownData, fit: ModalFit) -> OwnPoles:
     """Fit poles to one ring-down alone, starting from those of fitted springs and drives."""
-    return own_poles(arm, ringing, lowest_poles(fit.drivetrain, arm.mass(ringing.q, ringing.payload)))
+    return own_poles(arm, ring_down, lowest_poles(fit.drivetrain, arm.mass(ring_down.q, ring_down.payload)))
 
 
 def describe(poles: Complex) -> tuple[Floats, Floats]:

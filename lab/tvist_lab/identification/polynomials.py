@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tvist_lab.identification.modal_fit import ModalFit, own_poles_near
-from tvist_lab.identification.ring_downs import Ringing
+from tvist_lab.identification.ring_downs import RingDownData
 from tvist_lab.identification.unknowns import ArmModes
 from tvist_lab.recordings import Floats
 from tvist_protocol.calibration import PolynomialModel, Spread
@@ -26,7 +26,7 @@ Deviations = dict[str, Spread]
 
 
 def polynomials(
-    arm: ArmModes, ringings: Sequence[Ringing], springs: ModalFit
+    arm: ArmModes, ring_downs: Sequence[RingDownData], springs: ModalFit
 ) -> tuple[PolynomialModel, Deviations]:
     """Fit polynomials to the lowest mode of each ring-down, separated from higher modes by springs and drives.
 
@@ -34,8 +34,8 @@ def polynomials(
     """
     changing = tuple(joint for joint in (1, 2, 3) if joint < arm.description.joints) or (0,)
     degree = DEGREES[len(changing) - 1]
-    _check_count(len(ringings), changing, degree)
-    own = [(ringing.q, own_poles_near(arm, ringing, springs)) for ringing in ringings]
+    _check_count(len(ring_downs), changing, degree)
+    own = [(ring_down.q, own_poles_near(arm, ring_down, springs)) for ring_down in ring_downs]
     kept = [(q, poles.f_d[0], poles.zeta[0]) for q, poles in own if 0 in poles.certain]
     _check_count(len(kept), changing, degree)
     q, f_d, zeta = (np.array(column) for column in zip(*kept, strict=True))

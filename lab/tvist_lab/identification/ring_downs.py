@@ -46,7 +46,7 @@ def check_model(info: Info, description: RobotDescription) -> None:
 
 
 @dataclass(frozen=True)
-class Ringing:
+class RingDownData:
     """Acceleration of the tool at a configuration after a stop."""
 
     q: Floats  # configuration, shape (n,) [rad]
@@ -98,7 +98,7 @@ class RingDownStop:
 
     log: str
     motion: int  # number of the motion in the log, from 1
-    ringing: Ringing | None
+    ring_down: RingDownData | None
     reason: str = ""  # why the ring-down is not usable; equal for stops with the same problem
 
 
@@ -118,7 +118,7 @@ def stops_of(logs: Sequence[Log]) -> tuple[list[RingDownStop], tuple[Payload, ..
 
 def unused(stops: Sequence[RingDownStop]) -> dict[str, int]:
     """Return the number of unused stops for each reason, the most frequent first."""
-    return dict(Counter(stop.reason for stop in stops if stop.ringing is None).most_common())
+    return dict(Counter(stop.reason for stop in stops if stop.ring_down is None).most_common())
 
 
 def objection(recording: Recording, motion: MotionRows) -> str:
@@ -155,12 +155,12 @@ def _stop(log: Log, number: int, motion: MotionRows, payload: int) -> RingDownSt
         )
     q = recording["target_q" if "target_q" in recording else "actual_q"][stop]
     late = time[rows] - time[rows[0]]
-    ringing = Ringing(
+    ring_down = RingDownData(
         q, payload, recording[SENSOR][rows], noise_of(recording, motion), late, driven=log.driven
     )
-    if ringing.rms() < SIGNAL_TO_NOISE * ringing.noise:
+    if ring_down.rms() < SIGNAL_TO_NOISE * ring_down.noise:
         return RingDownStop(log.name, number, None, "the vibration does not stand out of the noise")
-    return RingDownStop(log.name, number, replace(ringing, inexact=log.inexact * ringing.rms()))
+    return RingDownStop(log.name, number, replace(ring_down, inexact=log.inexact * ring_down.rms()))
 
 
 def fresh(recording: Recording) -> NDArray[np.intp]:

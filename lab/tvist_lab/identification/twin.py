@@ -124,9 +124,9 @@ def fit_twin(
     Without `checks`, each motion is predicted by a fit without it.
     """
     check_logs(description, [*logs, *checks])
-    stops, arm, ringings = agreeing(description, logs, progress)
+    stops, arm, ring_downs = agreeing(description, logs, progress)
     progress("fitting springs and drives to the stops")
-    modal = arm.parameters(fit_from_many(arm, ringings).logarithms)
+    modal = arm.parameters(fit_from_many(arm, ring_downs).logarithms)
     carried = (log.carried(motion.shaped_stop) for log in checks for motion in motions(log.recording))
     payloads = tuple(dict.fromkeys((*arm.payloads, *carried)))
     wrong = {(stop.log, stop.motion) for stop in stops if stop.reason == CONTRADICTS}

@@ -15,8 +15,8 @@ from tvist_lab.metrics.ring_down import (
     SIGNIFICANT,
     WINDOWS,
     Mode,
-    Ring,
     RingDown,
+    RingDownSignal,
     decay_rate,
     not_measurable,
 )
@@ -57,7 +57,7 @@ def agreed_modes(alpha: Floats, time: Floats, period: float, begin: float) -> Ri
     extrapolated to the stop. `ok` is false, with a `reason`, if the fits disagree.
     """
     first = int(np.searchsorted(time, begin - 1e-9))
-    whole = Ring(alpha[first:], time[first:], period, (0.0,))
+    whole = RingDownSignal(alpha[first:], time[first:], period, (0.0,))
     if whole.length < WINDOWS[0]:
         return not_measurable(
             f"only {whole.length:.3f} s were recorded after the stop, {WINDOWS[0]} s are needed"
@@ -68,7 +68,7 @@ def agreed_modes(alpha: Floats, time: Floats, period: float, begin: float) -> Ri
     starts *= len(fits)
     for start in begin + step * np.arange(1, STARTS):
         first = int(np.searchsorted(time, start - 1e-9))
-        more = list(_fits(Ring(alpha[first:], time[first:], period, (0.0,)).cut(LONGEST)))
+        more = list(_fits(RingDownSignal(alpha[first:], time[first:], period, (0.0,)).cut(LONGEST)))
         fits += more
         starts += [start] * len(more)
     heard_in = [
@@ -92,40 +92,40 @@ def agreed_modes(alpha: Floats, time: Floats, period: float, begin: float) -> Ri
     )
 
 
-def _fits(ring: Ring) -> Iterator[_Fit]:
+def _fits(signal: RingDownSignal) -> Iterator[_Fit]:
     """Yield the fit with as many modes as improve it significantly, and the next fit with more modes."""
     # If a strong mode changes while it decays, two modes at the same frequency would fit it best: a heavily
     # damped one for its start and a lightly damped one for its end. So modes near each other are merged.
     fits = []
-    for f_d, zeta in _poles(ring):
-        inside = (f_d > 3.05) & (f_d < 0.98 * ring.highest) & (np.abs(zeta) < 0.9 * DAMPING[1])
+    for f_d, zeta in _poles(signal):
+        inside = (f_d > 3.05) & (f_d < 0.98 * signal.highest) & (np.abs(zeta) < 0.9 * DAMPING[1])
         if inside.any():
             start = np.column_stack([f_d[inside], np.clip(zeta[inside], 2.0 * DAMPING[0], 0.6)])
             start = start[np.argsort(start[:, 0])]
             apart = np.flatnonzero(np.diff(np.log(start[:, 0])) > SAME_MODE) + 1
-            cost, found = ring.refine(np.concatenate([one.mean(axis=0) for one in np.split(start, apart)]))
+            cost, found = signal.refine(np.concatenate([one.mean(axis=0) for one in np.split(start, apart)]))
             if np.all(np.diff(np.log(np.sort(found[::2]))) > SAME_MODE):
                 fits.append((cost, found))
     chosen = 0
     for index in range(1, len(fits)):
         parameters = fits[index][1]
         added = (parameters.size - fits[chosen][1].size) // 2
-        gain = ring.alpha.size * math.log((fits[chosen][0] + 1e-300) / (fits[index][0] + 1e-300))
-        noise = float(np.mean(ring.colour(ring.unexplained(parameters), parameters[::2])))
+        gain = signal.alpha.size * math.log((fits[chosen][0] + 1e-300) / (fits[index][0] + 1e-300))
+        noise = float(np.mean(signal.colour(signal.unexplained(parameters), parameters[::2])))
         if added > 0 and gain > added * SIGNIFICANT * noise:
             chosen = index
     for _, parameters in fits[chosen : chosen + 2]:
-        modes, left = ring.modes_at(parameters)
+        modes, left = signal.modes_at(parameters)
         yield modes, float(np.sqrt(np.mean(left**2)))
 
 
-def _poles(ring: Ring) -> Iterator[tuple[Floats, Floats]]:
+def _poles(signal: RingDownSignal) -> Iterator[tuple[Floats, Floats]]:
     """Estimate f_d and ζ by ESPRIT (Roy and Kailath, IEEE Trans. ASSP 37, 1989), for each number of modes."""
-    time, period = ring.time, ring.period
+    time, period = signal.time, signal.period
     grid = np.arange(time[0], time[-1] + 0.5 * period, period)
-    joined = max(int(0.4 / (ring.highest * period)), 1)
+    joined = max(int(0.4 / (signal.highest * period)), 1)
     count = len(grid) // joined
-    even = np.column_stack([np.interp(grid, time, axis) for axis in ring.alpha.T])[: count * joined]
+    even = np.column_stack([np.interp(grid, time, axis) for axis in signal.alpha.T])[: count * joined]
     even = (even - even.mean(axis=0)).reshape(count, joined, -1).mean(axis=1)
     windows = [np.lib.stride_tricks.sliding_window_view(axis, count - count // 2 + 1) for axis in even.T]
     signals = np.linalg.svd(np.concatenate(windows), full_matrices=False)[2].T

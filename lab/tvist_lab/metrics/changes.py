@@ -7,9 +7,9 @@ from functools import cache, partial
 import numpy as np
 
 from tvist_lab.metrics.change_detector import SHOWN, ChangeDetector, DetectedChange
+from tvist_lab.metrics.frequency_factor import FrequencyFactorEstimator
 from tvist_lab.metrics.motion import MotionRows
 from tvist_lab.metrics.ring_down import CERTAIN
-from tvist_lab.metrics.ring_listener import RingListener
 from tvist_lab.metrics.table import MeasuredRecording, MotionResult
 from tvist_lab.recordings import Floats, Recording
 from tvist_plant.description import Payload, RobotDescription, load, robots
@@ -102,7 +102,7 @@ class FitMonitor:
 
     Each quantity is compared with its own past, so that wrong torque constants or springs do not matter: the mass that
     the drives feel beyond the declared one; the logarithm of each gear's deflection per torque at rest, if encoders
-    are on the link side; and the logarithm of the factor on the robot file's modes, see `RingListener`.
+    are on the link side; and the logarithm of the `FrequencyFactorEstimator`'s factor on the robot file's modes.
     """
 
     def __init__(self, description: RobotDescription, payload: Payload) -> None:
@@ -114,7 +114,7 @@ class FitMonitor:
         self._weighs = carries_weight(description)
         self._arm = rigid_model(description, Payload())
         self._loaded = rigid_model(description, Payload(mass=1.0, com=payload.com))
-        self._listener = RingListener(description, payload)
+        self._frequency_factor = FrequencyFactorEstimator(description, payload)
         self._mass, self._modes = ChangeDetector(*MASS), ChangeDetector(*MODES)
         self._gears = [ChangeDetector(*GEAR) for _ in range(description.joints)]
 
@@ -138,7 +138,7 @@ class FitMonitor:
             if error < VAGUE:
                 softer = float(np.log(twist[joint] * self._stiffness[joint] / torque[joint]))
                 yield from _told(detector.take(softer, error), partial(_of_gear, joint=self._names[joint]))
-        for u, error in self._listener.study(alpha, q[-1]):
+        for u, error in self._frequency_factor.estimate(alpha, q[-1]):
             yield from _told(self._modes.take(u, error), _of_modes)
 
     def _felt(self, q: Floats, feedback: Floats) -> tuple[float, float]:

@@ -108,20 +108,22 @@ def fit_ring_down(
     else:
         first = int(np.searchsorted(time, skip - 1e-9))
         late = time[first:]
-    ring = Ring(alpha[first:], late, period, (*slow_poles, 0.0) if offset else slow_poles, evidence)
+    signal = RingDownSignal(
+        alpha[first:], late, period, (*slow_poles, 0.0) if offset else slow_poles, evidence
+    )
     if window is not None:
-        return ring.cut(window).fit(modes)
-    if ring.length < WINDOWS[0]:
+        return signal.cut(window).fit(modes)
+    if signal.length < WINDOWS[0]:
         return not_measurable(
-            f"only {ring.length:.3f} s were recorded after the stop, {WINDOWS[0]} s are needed"
+            f"only {signal.length:.3f} s were recorded after the stop, {WINDOWS[0]} s are needed"
         )
-    fit = ring.cut(WINDOW).fit(modes)
+    fit = signal.cut(WINDOW).fit(modes)
     audible = math.log(max(fit.amplitude / max(fit.rms, 1e-12), 2.0)) / decay_rate(fit.f_d, fit.zeta)
     chosen = min(max(audible, WINDOWS[0]), WINDOWS[1])
-    return ring.cut(chosen).fit(modes) if chosen != fit.window else fit
+    return signal.cut(chosen).fit(modes) if chosen != fit.window else fit
 
 
-class Ring:
+class RingDownSignal:
     """A ring-down and the projection that eliminates its amplitudes."""
 
     def __init__(
@@ -138,10 +140,12 @@ class Ring:
         self.highest = min(FREQUENCIES[1], 0.45 / period)
         self._slow = [np.exp(-pole * time) for pole in slow_poles]
 
-    def cut(self, window: float) -> "Ring":
+    def cut(self, window: float) -> "RingDownSignal":
         """Return the first part of the ring-down."""
         past = int(np.searchsorted(self.time, self.time[0] + window - 0.5 * self.period))
-        return Ring(self.alpha[:past], self.time[:past], self.period, self.slow_poles, self.evidence)
+        return RingDownSignal(
+            self.alpha[:past], self.time[:past], self.period, self.slow_poles, self.evidence
+        )
 
     def basis(self, parameters: Floats) -> Floats:
         """Return functions of time whose amplitudes are eliminated, for (f_d, ζ) per mode, (T, columns)."""

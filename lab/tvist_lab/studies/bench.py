@@ -184,7 +184,7 @@ def _rank(result: Result, asked: StudyRequest, faults: Mapping[str, str]) -> Non
     values["notes"] += [
         f"{name} ({labels[name].label}) is not ranked: it {why}" for name, why in wrong.items()
     ]
-    if told := [one["shaper"] for one in entries if labels[one["shaper"]].told_target]:
+    if told := [one["shaper"] for one in entries if labels[one["shaper"]].needs_target]:
         values["notes"].append(f"these shapers are given the target before each move: {', '.join(told)}")
     if faults:
         values["failure"] = "; ".join(

@@ -61,5 +61,5 @@ def _elsewhere(method: Method, task: Task, tick: int, sign: float) -> Task:
     reference = task.reference.copy()
     late = PERIOD * np.arange(1, len(reference) - tick)
     reference[tick + 1 :] += sign * 0.5 * ELSEWHERE * late[:, None] ** 2
-    told = task.move.target if method.told_target else tuple(reference[-1].tolist())
+    told = task.move.target if method.needs_target else tuple(reference[-1].tolist())
     return replace(task, reference=reference, move=replace(task.move, target=told))

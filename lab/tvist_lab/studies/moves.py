@@ -70,7 +70,7 @@ def study(asked: StudyRequest) -> Study:
     moves = asked.feasible()
     named, others = asked.methods[: asked.named], asked.methods[asked.named :]
     if asked.streams:  # a shaper does not know the end of a stream
-        others = [one for one in others if not one.told_target]
+        others = [one for one in others if not one.needs_target]
     weak, notes = len(asked.moves) - len(moves), list(asked.notes)
     if weak:
         notes.append(f"{weak} of {len(asked.moves)} moves were left out: the drives are too weak")

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tvist_controller.api.line import (
-    Driven,
+    DriveCommandSeries,
     DrivenLine,
     ElasticFeedForward,
     JointLine,
@@ -103,7 +103,7 @@ class ControlLine:
 class FollowedReference:
     """A shaped reference, and the drives' commands to follow it; see `ControlLine.follow`."""
 
-    def __init__(self, start: Floats, reference: Floats, driven: Driven, delay: float) -> None:
+    def __init__(self, start: Floats, reference: Floats, driven: DriveCommandSeries, delay: float) -> None:
         ticks, n = len(driven.targets), len(start)
         late = round(driven.delay / PERIOD)
         targets = driven.targets.copy()

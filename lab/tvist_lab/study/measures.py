@@ -35,7 +35,7 @@ WORTH = 0.2  # unshaped peak [m/s²] below which a move is listed, but not count
 QUIET_LEVEL = 0.02  # |α| below which an arm counts as at rest, by a stricter measure than `STILL` [m/s²]
 
 
-class MadeMotion:
+class ExecutedMotion:
     """A motion that an arm has made, with the unshaped motion to compare it with."""
 
     def __init__(
@@ -43,14 +43,14 @@ class MadeMotion:
         case: Case,
         shaped: Shaped,
         recording: Recording,
-        unshaped: "Callable[[], MadeMotion]",
-        like: "MadeMotion | None" = None,
+        unshaped: "Callable[[], ExecutedMotion]",
+        like: "ExecutedMotion | None" = None,
     ) -> None:
         self.case, self.shaped, self.recording = case, shaped, recording
         self._unshaped, self._like = unshaped, like
 
     @cached_property
-    def unshaped(self) -> "MadeMotion":
+    def unshaped(self) -> "ExecutedMotion":
         """The unshaped motion, which may be this one."""
         return self._unshaped()
 
@@ -115,10 +115,10 @@ class Measure:
     name: str
     unit: str  # unit; "–" for a ratio
     meaning: str
-    of: Callable[[MadeMotion], float | None]  # measures a motion; None if not measurable or irrelevant
+    of: Callable[[ExecutedMotion], float | None]  # measures a motion; None if not measurable or irrelevant
 
 
-def _late(at: float | None, motion: MadeMotion) -> float | None:
+def _late(at: float | None, motion: ExecutedMotion) -> float | None:
     """Convert a time [s] to the time after the unshaped reference's stop [ms], since moves vary in length."""
     return None if at is None else round(1e3 * (at - motion.unshaped.duration), 6)
 
@@ -131,7 +131,7 @@ def _largest(q: Floats, order: int) -> float:
     return float(np.abs(np.diff(q, order, axis=0) / PERIOD**order).max())
 
 
-def _since_stop(motion: MadeMotion) -> float | None:
+def _since_stop(motion: ExecutedMotion) -> float | None:
     at = motion.still()
     return None if at is None else 1e3 * (at - motion.rows.duration(motion.recording))
 
@@ -196,10 +196,12 @@ _ALL = (
     ),
     Measure(
         "residual_m_s2", "m/s²",
-        "largest envelope of the tool's acceleration within 3 to 60 Hz after the declared end", MadeMotion.residual,
+        "largest envelope of the tool's acceleration within 3 to 60 Hz after the declared end",
+        ExecutedMotion.residual,
     ),
     Measure(
-        "in_motion_m_s2", "m/s²", "rms of the tool's acceleration relative to that of a rigid arm", MadeMotion.in_motion
+        "in_motion_m_s2", "m/s²", "rms of the tool's acceleration relative to that of a rigid arm",
+        ExecutedMotion.in_motion,
     ),
     Measure(
         "declared_delay_ms", "ms", "delay of what the drives get, by the shaper's word",
@@ -228,7 +230,7 @@ OF_PEAKS = (
 """Measures that `evaluate` and sweeps use."""
 
 
-def measured(motion: MadeMotion, names: Iterable[str]) -> dict[str, float | None]:
+def measured(motion: ExecutedMotion, names: Iterable[str]) -> dict[str, float | None]:
     """Measure a motion; see `MEASURES`."""
     return {name: MEASURES[name].of(motion) for name in names}
 

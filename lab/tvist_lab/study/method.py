@@ -43,7 +43,7 @@ class Method(ABC):
     label: str  # name for display
 
     @property
-    def told_target(self) -> bool:
+    def needs_target(self) -> bool:
         """Whether the method needs a motion's end in advance, and therefore cannot shape a stream."""
         return False
 
@@ -88,7 +88,7 @@ class Named(SampleMethod):
     alone: bool = False  # whether to omit the elastic feed-forward that the filter needs
 
     @property
-    def told_target(self) -> bool:
+    def needs_target(self) -> bool:
         """Whether the filter uses the target."""
         return self.recipe.shaper == AIMED
 
@@ -125,7 +125,7 @@ class ConstantModes(SampleMethod):
     for_payload: bool = False  # whether the shaper is designed for the declared payload
 
     @property
-    def told_target(self) -> bool:
+    def needs_target(self) -> bool:
         """Whether the shaper is designed for the end of each move."""
         return self.f_d is None and not self.for_payload
 
@@ -168,7 +168,7 @@ class ConstantMeanDelay(SampleMethod):
 class Planned(Method):
     """A method that plans a motion instead of shaping a reference; it cannot make streams or curved paths."""
 
-    told_target = True
+    needs_target = True
 
 
 @dataclass(frozen=True)

@@ -219,7 +219,7 @@ class Study:
 
 def described(methods: Iterable[Method]) -> list[dict[str, Any]]:
     """Return the entry of each method for --json."""
-    return [{"name": one.name, "label": one.label, "told_target": one.told_target} for one in methods]
+    return [{"name": one.name, "label": one.label, "told_target": one.needs_target} for one in methods]
 
 
 def _kind_of(name: str, cases: Iterable[Case]) -> Any:

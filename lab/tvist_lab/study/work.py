@@ -12,7 +12,7 @@ from tvist_lab.recordings import Recording
 from tvist_lab.runners import TaskError
 from tvist_lab.study.case import Case
 from tvist_lab.study.line import ControlLine
-from tvist_lab.study.measures import OF_PEAKS, MadeMotion, measured
+from tvist_lab.study.measures import OF_PEAKS, ExecutedMotion, measured
 from tvist_lab.study.method import Method, Task, WaitingMethod
 from tvist_lab.study.shaping import Shaped, ShaperFaultError
 from tvist_plant.description import Payload
@@ -58,7 +58,7 @@ class Bench:
         self._line = ControlLine(
             case.description, np.array(case.move.start), self._body(case.declared.mass), law
         )
-        self._plain: dict[str, MadeMotion] = {}
+        self._plain: dict[str, ExecutedMotion] = {}
         self.ticks: int | None = None
         """Duration of the first motion, for methods of equal duration; None before it is measured."""
 
@@ -71,7 +71,7 @@ class Bench:
     def _body(self, mass: float) -> Payload:
         return body(paper_payload(self.job.case.description, mass))
 
-    def make(self, method: Method) -> Iterator[tuple[str, MadeMotion]]:
+    def make(self, method: Method) -> Iterator[tuple[str, ExecutedMotion]]:
         """Yield each arm's name and motion."""
         if isinstance(method, WaitingMethod):
             yield from ((arm.name, self.unshaped(arm.name)) for arm in self.job.case.arms)
@@ -80,16 +80,16 @@ class Bench:
         follow, first = self._following(shaped), None
         for arm in self.job.case.arms:
             unshaped = partial(self.unshaped, arm.name)
-            motion = MadeMotion(self.job.case, shaped, follow(arm.name), unshaped, first)
+            motion = ExecutedMotion(self.job.case, shaped, follow(arm.name), unshaped, first)
             first = first or motion
             yield arm.name, motion
 
-    def unshaped(self, arm: str) -> MadeMotion:
+    def unshaped(self, arm: str) -> ExecutedMotion:
         """Return the unshaped motion of an arm, which is simulated once."""
         if arm not in self._plain:
             shaped = Shaped(self.task.reference)
             recording = self._following(shaped)(arm)
-            self._plain[arm] = MadeMotion(self.job.case, shaped, recording, partial(self.unshaped, arm))
+            self._plain[arm] = ExecutedMotion(self.job.case, shaped, recording, partial(self.unshaped, arm))
         return self._plain[arm]
 
     def _following(self, shaped: Shaped) -> Callable[[str], Recording]:

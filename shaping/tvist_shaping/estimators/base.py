@@ -2,10 +2,10 @@
 
 from abc import ABC, abstractmethod
 
-from tvist_shaping._types import Floats, Forked
+from tvist_shaping._types import Floats, Forkable
 
 
-class Estimator(Forked, ABC):
+class Estimator(Forkable, ABC):
     """Damped frequency and damping ratio of each mode as functions of q, sec. 3.3 of the paper.
 
     Attributes:

@@ -14,7 +14,7 @@ from tvist_controller.programs.sockets import (
     Expire,
     Open,
     Send,
-    SocketNews,
+    SocketEvent,
     SocketOrder,
     SocketPorts,
     Taken,
@@ -37,7 +37,7 @@ MAX_UNSENT: Final = 262_144  # number of unsent bytes above which the peer is di
 class _Link(asyncio.Protocol):
     """One socket, used in the network's thread; `tell` reports its events to the controller."""
 
-    def __init__(self, number: int, tell: Callable[[SocketNews], None]) -> None:
+    def __init__(self, number: int, tell: Callable[[SocketEvent], None]) -> None:
         self._number, self._tell = number, tell
         self._transport: asyncio.Transport | None = None
         self._received = 0
@@ -97,7 +97,7 @@ class _Link(asyncio.Protocol):
 
     def _say(self, change: SocketChange, data: bytes = b"") -> None:
         if not self.ended:
-            self._tell(SocketNews(self._number, change, data))
+            self._tell(SocketEvent(self._number, change, data))
 
 
 class ProgramSockets(Gateway, SocketPorts):
@@ -106,7 +106,7 @@ class ProgramSockets(Gateway, SocketPorts):
     wanted_topics: Collection[Topic] = ()
 
     def __init__(
-        self, tell: Callable[[SocketNews], None], warn: Callable[[str], None], allowed: AllowedHosts
+        self, tell: Callable[[SocketEvent], None], warn: Callable[[str], None], allowed: AllowedHosts
     ) -> None:
         self._tell_controller, self._warn, self._allowed = tell, warn, allowed
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -120,7 +120,7 @@ class ProgramSockets(Gateway, SocketPorts):
 
     # The following methods run in the controller's thread.
 
-    def carry_out(self, orders: Sequence[SocketOrder]) -> Sequence[SocketNews]:
+    def carry_out(self, orders: Sequence[SocketOrder]) -> Sequence[SocketEvent]:
         """Carry out orders; the results are reported later."""
         now = time.monotonic()
         for order in orders:
@@ -145,10 +145,10 @@ class ProgramSockets(Gateway, SocketPorts):
                 case Expire():
                     left = self._waits[order.wait][1] + order.seconds - now
                     # Through the network's thread, so that data that came earlier is reported first.
-                    self._soon(partial(self._later, left, SocketNews(order.wait, "expired")))
+                    self._soon(partial(self._later, left, SocketEvent(order.wait, "expired")))
         return ()
 
-    def note(self, news: SocketNews) -> None:
+    def note(self, news: SocketEvent) -> None:
         """Note that the controller gets this news before its next tick."""
         if news.change == "expired":
             if news.number in self._waits:
@@ -191,7 +191,7 @@ class ProgramSockets(Gateway, SocketPorts):
     def close(self) -> None:
         self._loop = self._early = None
 
-    def _later(self, seconds: float, news: SocketNews) -> None:
+    def _later(self, seconds: float, news: SocketEvent) -> None:
         asyncio.get_running_loop().call_later(max(0.0, seconds), self._tell_controller, news)
 
     def _begin(self, order: Open, link: _Link) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from tvist_controller.kinematics.arm import Arm
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.model import Floats
-from tvist_plant.plant import GRAVITY, Halt, Sight
+from tvist_plant.plant import GRAVITY, Halt, RobotReport
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 from tvist_server.moving.interfaces import Configuration
 from tvist_server.moving.program import ProgramEnded
@@ -106,9 +106,9 @@ def version_trouble(version: Sequence[int]) -> str | None:
     )
 
 
-def why_not_by_state(expected: Expected, sight: Sight, *, may_play: bool = False) -> str | None:
+def why_not_by_state(expected: Expected, report: RobotReport, *, may_play: bool = False) -> str | None:
     """Return why a robot must not be moved now, else None. `may_play`: a program on it is tvist's own."""
-    mode, safety, runtime = sight.modes
+    mode, safety, runtime = report.modes
     reasons = (
         (mode == RobotMode.DISCONNECTED, "it is not connected: check the network and the robot"),
         (safety != SafetyMode.NORMAL,
@@ -119,12 +119,12 @@ def why_not_by_state(expected: Expected, sight: Sight, *, may_play: bool = False
          "a program runs on it, or is paused: stop that at the robot or at its client"),
     )  # fmt: skip
     why = next((why for wrong, why in reasons if wrong), None)
-    return why or _posture_trouble(expected, sight) or _load_trouble(expected, sight)
+    return why or _posture_trouble(expected, report) or _load_trouble(expected, report)
 
 
-def _posture_trouble(expected: Expected, sight: Sight) -> str | None:
-    target, measured = sight.target[0], sight.measured.q
-    if np.abs(sight.target[1]).max() > STILL:
+def _posture_trouble(expected: Expected, report: RobotReport) -> str | None:
+    target, measured = report.target[0], report.measured.q
+    if np.abs(report.target[1]).max() > STILL:
         return "it moves: wait until it is at rest"
     if (joint := _apart(target, measured)) is not None:
         by = abs(target[joint] - measured[joint])
@@ -147,8 +147,8 @@ def _posture_trouble(expected: Expected, sight: Sight) -> str | None:
     return None
 
 
-def _load_trouble(expected: Expected, sight: Sight) -> str | None:
-    told, tool = sight.payload, sight.tool
+def _load_trouble(expected: Expected, report: RobotReport) -> str | None:
+    told, tool = report.payload, report.tool
     if told is not None and abs(told.mass - expected.payload.mass) > SAME_MASS:
         return (
             f"its payload is set to {told.mass:.3g} kg, and here it is {expected.payload.mass:.3g} kg: give "

@@ -10,7 +10,7 @@ import numpy as np
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand
 from tvist_plant.model import Floats
-from tvist_plant.plant import PERIOD, Condition, Halt, Measurement, PlantError, RealArm, Sight
+from tvist_plant.plant import PERIOD, Condition, Halt, Measurement, PlantError, RealArm, RobotReport
 from tvist_protocol.modes import RuntimeState, SafetyMode
 from tvist_server.moving.checks import (
     FELL_SILENT,
@@ -53,17 +53,17 @@ class MovedRobot(RealArm):
     ) -> None:
         self._robot = WatchedRobot(place, description, payload, OUTPUTS, INPUTS)
         self._place = place
-        self._sight = self._robot.last
+        self._report = self._robot.last
         self._told = [f"no joint moves faster than {speed_cap:g} rad/s (--speed-cap)"]
         own = configuration_of(place)
         answers = query_dashboard(place, QUESTIONS)
         file = Expected(description, payload, tool, start)
         self._refuse_if(version_trouble(self._robot.version) or why_not_by_answers(file, answers, own))
         self._expected = file._replace(description=narrow_limits(description, own, speed_cap))
-        self._refuse_if(why_not_by_state(self._expected, self._sight))
+        self._refuse_if(why_not_by_state(self._expected, self._report))
         felt = np.mean([row["actual_tool_accelerometer"] for row in self._robot.first_rows], axis=0)
         if tells_gravity(felt):
-            self._refuse_if(mounting_trouble(description, self._sight.measured.q, felt))
+            self._refuse_if(mounting_trouble(description, self._report.measured.q, felt))
         else:
             self._told.append("its accelerometer does not measure gravity: its mounting was not checked")
         self._expected = self._expected._replace(q=None)  # matters only before the first motion
@@ -95,29 +95,29 @@ class MovedRobot(RealArm):
         run = self._run
         if run is None or not run.ready:
             may_play = run is not None or self._left_paused
-            self._refuse_if(why_not_by_state(self._expected, self._sight, may_play=may_play))
+            self._refuse_if(why_not_by_state(self._expected, self._report, may_play=may_play))
         last = None if run is None else run.last
         return self._measured(last or self._robot.newest["target_q"])
 
     def step(self, command: DriveCommand) -> Measurement:
         """Queue a set-point, return the latest measurements; of periods made up for, only the last sends."""
         if self._run is not None:
-            self._run.add(command, played=(self._pace.tick - self._sight.tick) % self._interval == 0)
+            self._run.add(command, played=(self._pace.tick - self._report.tick) % self._interval == 0)
             if not self._pace.owed:
                 self._run.write()
-        return self._measured(self._sight.measured.q)
+        return self._measured(self._report.measured.q)
 
     def _measured(self, q: Floats | Sequence[float]) -> Measurement:
         """Return the latest measurements, but with `q` as posture and the time of the present period."""
-        felt = self._sight.measured
+        felt = self._report.measured
         return Measurement(
             np.array(q), felt.qd, felt.moment, felt.accelerometer, timestamp=self._pace.tick * PERIOD
         )
 
-    def seen(self) -> Sight:
+    def latest_report(self) -> RobotReport:
         """Return the robot's last row, with the messages for users since the last call."""
         told, self._told = (*self._told,), []
-        return replace(self._sight, told=told)
+        return replace(self._report, told=told)
 
     def wait(self, timeout: float) -> bool:
         """Wait for the next period, according to the robot's clock, or to this machine's while the robot is silent."""
@@ -126,16 +126,16 @@ class MovedRobot(RealArm):
             if self._pace.next(now):
                 return True
             if self._robot.wait(min(self._pace.until(now), until - now)):
-                if self._take(self._robot.sight()):
+                if self._take(self._robot.cycle_report()):
                     return True
             elif self._run is not None and self._pace.silent(time.monotonic()) and not self._robot.wait(0.0):
                 # The last check: this process may have been suspended, with rows waiting to be read.
                 self._let_go(FELL_SILENT)
         return self._pace.next(time.monotonic())
 
-    def _take(self, sight: Sight) -> bool:
-        self._sight = sight
-        self._told += sight.told
+    def _take(self, report: RobotReport) -> bool:
+        self._report = report
+        self._told += report.told
         if not self._robot.connected:
             if self._held:
                 self._let_go(FELL_SILENT)
@@ -149,17 +149,17 @@ class MovedRobot(RealArm):
                     self._robot, self._place, self._number, limits, self._lag, self._trouble
                 )
             else:  # something has changed since the last check
-                self._let_go(Halt(trouble, sight.modes[1]))
-        self._left_paused &= sight.modes[2] in {RuntimeState.PAUSING, RuntimeState.PAUSED}
+                self._let_go(Halt(trouble, report.modes[1]))
+        self._left_paused &= report.modes[2] in {RuntimeState.PAUSING, RuntimeState.PAUSED}
         if self._run is not None:
-            told = self._run.take(sight)
+            told = self._run.take(report)
             self._told += [] if told is None else [told]
             if self._run.halt is not None:
                 self._let_go(self._run.halt)
-        return self._pace.row(sight.tick, time.monotonic())
+        return self._pace.row(report.tick, time.monotonic())
 
     def _trouble(self) -> str | None:
-        return why_not_by_state(self._expected, self._sight, may_play=self._left_paused)
+        return why_not_by_state(self._expected, self._report, may_play=self._left_paused)
 
     @property
     def condition(self) -> Condition:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from tvist_plant.drives import DriveCommand
-from tvist_plant.plant import Halt, Sight
+from tvist_plant.plant import Halt, RobotReport
 from tvist_plant.robot_tables import ArmLimits
 from tvist_protocol.modes import RuntimeState
 from tvist_server.moving.checks import REMOTE, REPLACED, halt_by_modes, halt_by_program, remote_trouble
@@ -98,28 +98,28 @@ class ProgramRun:
         self._upload.close()
         self._waiting = self._follows = self.ready = False
 
-    def take(self, sight: Sight) -> str | None:
+    def take(self, report: RobotReport) -> str | None:
         """Update the program's state from a row; return a message for users, if any."""
         state, played, ended, number, alone, left_out = (
             int(self._robot.newest[f"output_int_register_{place}"][0])
             for place in (STATE, PLAYED, ENDED, RUN, ALONE, LEFT_OUT)
         )
-        self.halt = self.halt or halt_by_modes(sight.modes)
+        self.halt = self.halt or halt_by_modes(report.modes)
         ours = number == self._number
         if not self._plays:
-            self._plays = ours and sight.modes[2] == RuntimeState.PLAYING
+            self._plays = ours and report.modes[2] == RuntimeState.PLAYING
             if self.halt is None and self._upload.trouble is not None:
-                self.halt = Halt(self._upload.trouble, sight.modes[1])
+                self.halt = Halt(self._upload.trouble, report.modes[1])
             elif self.halt is None and time.monotonic() - self._begun > BEGINS:
                 why = f"the program has not started within {BEGINS:g} s: look for a message on its teach pendant"
-                self.halt = Halt(f"{why}, then power on here", sight.modes[1])
+                self.halt = Halt(f"{why}, then power on here", report.modes[1])
             return None
         self._still = self._still + 1 if state == ProgramState.FOLLOWING and played == self._played else 0
         self._played = played
-        ends = halt_by_program(ended if ours else 0, sight.modes)
+        ends = halt_by_program(ended if ours else 0, report.modes)
         waits = state == ProgramState.WAITING and self._window.number > HEEDS
         if ends is None and (not ours or waits or self._still >= STANDS):
-            ends = Halt(REPLACED, sight.modes[1])
+            ends = Halt(REPLACED, report.modes[1])
         self._ending = 0 if ends is None else self._ending + 1
         if self._ending > GRACE:
             self.halt = self.halt or ends

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tvist_plant.description import Payload, is_real_body
-from tvist_plant.plant import PERIOD, Measurement, Sight
+from tvist_plant.plant import PERIOD, Measurement, RobotReport
 from tvist_server.rtde.client import Row, RtdeError
 from tvist_server.rtde.wire import Field, WireType
 
@@ -44,14 +44,16 @@ SAME_CLOCK = 1.0
 """Largest lead of a row over earlier ones, and largest difference of the clocks after a lost connection [s]."""
 
 
-def sight_of(row: Row, constants: Sequence[float], tick: int, missed: int, told: Sequence[str] = ()) -> Sight:
+def report_of(
+    row: Row, constants: Sequence[float], tick: int, missed: int, told: Sequence[str] = ()
+) -> RobotReport:
     """Convert a row to SI units; `constants` are torque constants [N m/A], for robots that report no torques."""
     torque, slider = row.get("actual_current_as_torque"), row.get("target_speed_fraction")
     moment = np.array(row["actual_current"]) * np.array(constants) if torque is None else np.array(torque)
     angles, rates, felt = (
         np.array(row[name]) for name in ("actual_q", "actual_qd", "actual_tool_accelerometer")
     )
-    return Sight(
+    return RobotReport(
         tick,
         Measurement(angles, rates, moment, felt, timestamp=row["timestamp"][0]),
         np.array([row[f"target_{name}"] for name in ("q", "qd", "qdd", "moment")]),

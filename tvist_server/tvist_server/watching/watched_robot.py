@@ -12,14 +12,14 @@ from tvist_controller.instruments.motors import joint_ratings
 from tvist_controller.kinematics.arm import Arm
 from tvist_plant.description import Payload, RobotDescription
 from tvist_plant.drives import DriveCommand
-from tvist_plant.plant import PERIOD, Measurement, PlantError, RealArm, Sight
+from tvist_plant.plant import PERIOD, Measurement, PlantError, RealArm, RobotReport
 from tvist_protocol.errors import harmless
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
 from tvist_server.rtde.client import Row, RtdeClient, RtdeError
 from tvist_server.rtde.wire import Field, WireType
 from tvist_server.watching.address import RobotAddress
 from tvist_server.watching.connection import ANSWERS, LostError, RtdeConnection, UnreachableError, resolve
-from tvist_server.watching.variables import JOINTS, NEEDED, OPTIONAL, RowCount, has_real_payload, sight_of
+from tvist_server.watching.variables import JOINTS, NEEDED, OPTIONAL, RowCount, has_real_payload, report_of
 
 FIRST_ROWS = 25  # number of rows that determine the row rate
 INTERVALS = {1: "500", 4: "125"}  # control periods between two rows, and the row rate of such a robot [Hz]
@@ -51,7 +51,7 @@ class WatchedRobot(RealArm):
         self._needed, self._inputs = {**NEEDED, **outputs}, inputs
         self._arm = Arm(description)
         self._constants = [rating.torque_constant for rating in joint_ratings(description)]
-        self._sights: deque[tuple[Sight, Row]] = deque()
+        self._reports: deque[tuple[RobotReport, Row]] = deque()
         self._connection: RtdeConnection | None = None
         self.first_rows: list[Row] = []  # rows read before the first tick
         self._checked = False  # whether the present connection has sent a row of the right robot
@@ -75,16 +75,16 @@ class WatchedRobot(RealArm):
     def interval(self) -> float:
         return self._interval * PERIOD
 
-    def sight(self) -> Sight:
+    def cycle_report(self) -> RobotReport:
         """Return the next row."""
-        if not self._sights:
+        if not self._reports:
             raise PlantError(f"the robot at {self._place} has sent no new row")
-        self.last, self.newest = self._sights.popleft()
+        self.last, self.newest = self._reports.popleft()
         return self.last
 
     def wait(self, timeout: float) -> bool:
         """Wait for the next row, at most for `timeout` [s]; connect if there is no connection."""
-        if self._sights:
+        if self._reports:
             return True
         if self._connection is None:
             left = self._retry_at - time.monotonic()
@@ -97,7 +97,7 @@ class WatchedRobot(RealArm):
                 self._take(row)
         except (LostError, RtdeError) as error:
             self._lose(error)
-        return bool(self._sights)
+        return bool(self._reports)
 
     @property
     def connected(self) -> bool:
@@ -138,7 +138,7 @@ class WatchedRobot(RealArm):
                 "be watched"
             )
         self._count = RowCount(self._interval)
-        self.last, self.newest = self._sight(rows[-1], 0), rows[-1]
+        self.last, self.newest = self._report(rows[-1], 0), rows[-1]
         software = ".".join(map(str, self.version[:3]))
         rate, done = INTERVALS[self._interval], "moved" if self._inputs else "watched"
         self._notes.append(
@@ -216,13 +216,13 @@ class WatchedRobot(RealArm):
                 "check the network and the load of this machine"
             )
             self._told_at, self._untold = now, 0
-        self._sights.append((self._sight(row, counted.tick), row))
+        self._reports.append((self._report(row, counted.tick), row))
 
-    def _sight(self, row: Row, tick: int) -> Sight:
-        sight = sight_of(row, self._constants, tick, self._count.missing, self._notes)
+    def _report(self, row: Row, tick: int) -> RobotReport:
+        report = report_of(row, self._constants, tick, self._count.missing, self._notes)
         self._notes = []
-        self.payload = sight.payload or self.payload
-        return sight
+        self.payload = report.payload or self.payload
+        return report
 
     def _lose(self, error: LostError | RtdeError) -> None:
         """Close the connection; report a loss once per reason in an extra tick, but no failed retries."""
@@ -233,11 +233,11 @@ class WatchedRobot(RealArm):
         if why == before or (before and isinstance(error, UnreachableError)):
             return
         self._lost = (since if before else now), why
-        latest, row = self._sights[-1] if self._sights else (self.last, self.newest)
+        latest, row = self._reports[-1] if self._reports else (self.last, self.newest)
         modes = int(RobotMode.DISCONNECTED), int(SafetyMode.UNDEFINED), int(RuntimeState.STOPPED)
         told = (*self._notes, f"{why}; the state stands still, and a connection is attempted every second")
         self._notes = []
-        self._sights.append((replace(latest, tick=self._count.silence(), modes=modes, told=told), row))
+        self._reports.append((replace(latest, tick=self._count.silence(), modes=modes, told=told), row))
 
 
 _NEXT = (

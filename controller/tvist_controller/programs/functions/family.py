@@ -14,7 +14,7 @@ from tvist_urscript import costs
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-class Parts(NamedTuple):
+class FunctionContext(NamedTuple):
     """Objects that the functions use: one robot, and the state shared by its programs."""
 
     access: Access
@@ -27,7 +27,7 @@ class Parts(NamedTuple):
     runstate: RunstateOutputs
 
 
-class Family:
+class FunctionGroup:
     """Functions of one subject for the programs of one robot.
 
     Scripts call the public methods; arguments are checked as annotated, see `checked`. What a function sets
@@ -36,7 +36,7 @@ class Family:
 
     title: ClassVar[str]  # heading in the reference page
 
-    def __init__(self, on: Parts) -> None:
+    def __init__(self, on: FunctionContext) -> None:
         self._access, self._arm, self._kinematics, self._parts = on.access, on.arm, on.kinematics, on
         self._peripherals = on.access.peripherals
 
@@ -51,10 +51,10 @@ def described(function: F, what: str, **kinds: object) -> F:
     return function
 
 
-def reads(what: str, read: Callable[[Parts], Any], cost: int = 1) -> Callable[[Family], Any]:
+def reads(what: str, read: Callable[[FunctionContext], Any], cost: int = 1) -> Callable[[FunctionGroup], Any]:
     """Return a parameterless function that reads a value, with its description and cost."""
 
-    def get(self: Family) -> Any:
+    def get(self: FunctionGroup) -> Any:
         return read(self._parts)
 
     return costs(cost)(described(get, what))

@@ -8,7 +8,7 @@ from tvist_controller.line.differentiator import Floats
 from tvist_controller.motion.force_control import Feature
 from tvist_controller.programs import arguments as args
 from tvist_controller.programs.blended_moves import Turns
-from tvist_controller.programs.functions.family import Family, Parts, reads
+from tvist_controller.programs.functions.family import FunctionContext, FunctionGroup, reads
 from tvist_controller.trajectory import ForceTask
 from tvist_protocol.forces import Push
 from tvist_protocol.io import Length
@@ -45,12 +45,12 @@ Axes = Annotated[Floats, _axes]
 Place = Annotated[tuple[float, ...], args.several(3, Length)]
 
 
-class ForceFunctions(Family):
+class ForceFunctions(FunctionGroup):
     """Force control of one robot."""
 
     title = "Force"
 
-    def __init__(self, on: Parts) -> None:
+    def __init__(self, on: FunctionContext) -> None:
         super().__init__(on)
         self._damping, self._gain = ForceTask.damping, ForceTask.gain
 

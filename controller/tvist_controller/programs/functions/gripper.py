@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from tvist_controller.cell.gripper import CLOSED, MOVING, OPEN, Gripper
 from tvist_controller.programs.arguments import number, whole
 from tvist_controller.programs.blended_moves import Turns
-from tvist_controller.programs.functions.family import Family, described
+from tvist_controller.programs.functions.family import FunctionGroup, described
 from tvist_urscript import Fault
 
 _ONE = "1"  # gripper of a call without one; ignored, because the cell has one gripper
@@ -36,7 +36,7 @@ def _percent(gripper: Gripper) -> int:
     return floor((gripper.read("POS") or 0) / 255.0 * 100.0)
 
 
-class GripperFunctions(Family):
+class GripperFunctions(FunctionGroup):
     """Functions of the cell's gripper."""
 
     title = "Gripper"

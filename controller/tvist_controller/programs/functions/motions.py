@@ -11,10 +11,10 @@ from tvist_controller.programs import arguments as args
 from tvist_controller.programs.access import Access, refusals_as_faults
 from tvist_controller.programs.arm import ProgramArm
 from tvist_controller.programs.blended_moves import Turns
-from tvist_controller.programs.functions.family import Family, Parts
+from tvist_controller.programs.functions.family import FunctionContext, FunctionGroup
 from tvist_controller.programs.kinematics import ProgramKinematics
 from tvist_controller.refusal import SLOWEST, check_joints
-from tvist_controller.trajectory import Speed
+from tvist_controller.trajectory import VelocityFollower
 from tvist_plant.plant import PERIOD
 from tvist_protocol.motions import ArcSegment, JointSegment, LineSegment, ProcessSegment, Segment
 from tvist_protocol.transitions import Activity
@@ -100,12 +100,12 @@ class ForceModeMoves:
         return away, max(float(np.linalg.norm(away[:3])), TURN * float(np.linalg.norm(away[3:])))
 
 
-class MotionFunctions(Family):
+class MotionFunctions(FunctionGroup):
     """Motions of one robot."""
 
     title = "Motions"
 
-    def __init__(self, on: Parts) -> None:
+    def __init__(self, on: FunctionContext) -> None:
         super().__init__(on)
         self._led = ForceModeMoves(on.access, on.arm, on.kinematics)
         on.arm.lead = self._led.follow
@@ -285,7 +285,7 @@ class MotionFunctions(Family):
             yield from self._arm.in_motion(t)
             return
         yield
-        while isinstance(speed := self._access.guidance.guided, Speed) and speed.duration > 0.0:
+        while isinstance(speed := self._access.guidance.guided, VelocityFollower) and speed.duration > 0.0:
             yield
 
     def _posture(self, name: str, value: object) -> tuple[float, ...]:

@@ -5,7 +5,7 @@ from typing import Annotated
 from tvist_controller.programs.access import OWN_TOKEN
 from tvist_controller.programs.arguments import Flag, above_zero, readable, shown, whole, within, word
 from tvist_controller.programs.blended_moves import Turns
-from tvist_controller.programs.functions.family import Family
+from tvist_controller.programs.functions.family import FunctionGroup
 from tvist_plant.plant import PERIOD
 from tvist_protocol.commands import PowerOff
 from tvist_protocol.stream import PopupKind
@@ -15,7 +15,7 @@ LONGEST_TEXT = 350  # number of list elements that fit into a text
 LONGEST_SLEEP = 1e6  # longest time of `sleep` [s]
 
 
-class MessageFunctions(Family):
+class MessageFunctions(FunctionGroup):
     """Messages to users, and waiting."""
 
     title = "Messages and time"
@@ -67,7 +67,7 @@ class MessageFunctions(Family):
             yield
 
 
-class StatementFunctions(Family):
+class StatementFunctions(FunctionGroup):
     """Statements added by clients."""
 
     title = "Statements from clients"
@@ -89,7 +89,7 @@ class StatementFunctions(Family):
         self._parts.statements.clear()
 
 
-class SafetyFunctions(Family):
+class SafetyFunctions(FunctionGroup):
     """Stops, and watchdogs for clients."""
 
     title = "Safety"

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Annotated, Any
 
 from tvist_controller.programs import arguments as args
-from tvist_controller.programs.functions.family import Family, Parts, described, reads
+from tvist_controller.programs.functions.family import FunctionContext, FunctionGroup, described, reads
 from tvist_controller.programs.functions.terminals import BitPlace, Configurable, Standard, Tool
 from tvist_controller.programs.indicators import SHOWS_UNTIL_FAILURE, Group
 from tvist_urscript import Array, Fault
@@ -42,8 +42,8 @@ _AS_INPUT = "Check an input's action, as `set_standard_digital_input_action`."
 _AS_OUTPUT = "Choose what an output does, as `set_runstate_standard_digital_output_to_value`."
 
 
-def _input_action(what: str, where: str, place: object) -> Callable[[Family, int, str], None]:
-    def check(self: Family, port: int, action: Action) -> None:
+def _input_action(what: str, where: str, place: object) -> Callable[[FunctionGroup, int, str], None]:
+    def check(self: FunctionGroup, port: int, action: Action) -> None:
         if action == "freedrive":
             why = "here freedrive_mode lets the arm be moved by hand, and no input"
             self._warn(f"{where} {port} has the action freedrive: {why}")
@@ -51,19 +51,19 @@ def _input_action(what: str, where: str, place: object) -> Callable[[Family, int
     return described(check, what, port=place)
 
 
-def _runstate_output(what: str, group: Group, place: object) -> Callable[[Family, int, int], None]:
-    def choose(self: Family, outputId: int, state: RunState) -> None:
+def _runstate_output(what: str, group: Group, place: object) -> Callable[[FunctionGroup, int, int], None]:
+    def choose(self: FunctionGroup, outputId: int, state: RunState) -> None:
         self._arm.then(lambda: self._parts.runstate.choose(group, outputId, state))
 
     return described(choose, what, outputId=place)
 
 
-class SetupFunctions(Family):
+class SetupFunctions(FunctionGroup):
     """Set-up of one robot."""
 
     title = "Set-up"
 
-    def __init__(self, on: Parts) -> None:
+    def __init__(self, on: FunctionContext) -> None:
         super().__init__(on)
         self._motion_version = 2
 

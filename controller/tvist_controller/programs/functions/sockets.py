@@ -7,7 +7,7 @@ from struct import pack, unpack_from
 from typing import Annotated, Any, TypeVar
 
 from tvist_controller.programs.arguments import Flag, Number, Text, a_list, text, whole
-from tvist_controller.programs.functions.family import Family
+from tvist_controller.programs.functions.family import FunctionGroup
 from tvist_controller.programs.sockets import Take
 from tvist_urscript import Value, costs, to_str
 from tvist_urscript.texts import DECIMAL
@@ -35,7 +35,7 @@ Int32 = Annotated[int, whole(-(2**31), 2**31 - 1)]
 Count = Annotated[int, whole(0, MAX_VALUES)]
 
 
-class SocketFunctions(Family):
+class SocketFunctions(FunctionGroup):
     """Opens, closes, reads and writes sockets.
 
     Reading takes what has arrived and waits for the rest, without limit if the timeout is not above 0.

@@ -12,7 +12,7 @@ from tvist_controller.kinematics.arm import InverseDynamics
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.programs import arguments
 from tvist_controller.programs.arguments import Joints, Target, Text, a_list, a_pose, integer, numbers
-from tvist_controller.programs.functions.family import Family, Parts, reads
+from tvist_controller.programs.functions.family import FunctionContext, FunctionGroup, reads
 from tvist_controller.programs.functions.settings import ToolPose
 from tvist_controller.refusal import RefusalError, check_joints
 from tvist_plant.plant import PERIOD
@@ -27,33 +27,33 @@ INTEGRATED = {
 """RTDE variables that depend on all earlier ticks."""
 
 
-def _positions(on: Parts) -> Array:
+def _positions(on: FunctionContext) -> Array:
     return a_list(on.access.latest().actual_q)
 
 
-def _pose(on: Parts, q: Sequence[float], tcp: Sequence[float] | None = None) -> Pose:
+def _pose(on: FunctionContext, q: Sequence[float], tcp: Sequence[float] | None = None) -> Pose:
     return a_pose(on.kinematics.tool_pose(np.array(q), tcp))
 
 
-def _speed(on: Parts, q: Sequence[float], qd: Sequence[float]) -> Array:
+def _speed(on: FunctionContext, q: Sequence[float], qd: Sequence[float]) -> Array:
     return a_list((on.kinematics.jacobian(np.array(q)) @ np.array(qd)).tolist())
 
 
-def _target_pose(on: Parts) -> Pose:
+def _target_pose(on: FunctionContext) -> Pose:
     return _pose(on, unshaped(on.access.latest())[0])
 
 
-def _target_speed(on: Parts) -> Array:
+def _target_speed(on: FunctionContext) -> Array:
     q, qd, _ = unshaped(on.access.latest())
     return _speed(on, q, qd)
 
 
-class StateFunctions(Family):
+class StateFunctions(FunctionGroup):
     """Functions that read the state of one robot."""
 
     title = "State"
 
-    def __init__(self, on: Parts) -> None:
+    def __init__(self, on: FunctionContext) -> None:
         super().__init__(on)
         self._instruments: Instruments | None = None  # computes RTDE variables; created when first needed
 
@@ -175,12 +175,12 @@ class StateFunctions(Family):
         return a_list(past[-1 - ago].tolist() if past else self._access.latest().actual_q)
 
 
-class PoseFunctions(Family):
+class PoseFunctions(FunctionGroup):
     """Kinematics and dynamics of one robot."""
 
     title = "Kinematics and dynamics"
 
-    def __init__(self, on: Parts) -> None:
+    def __init__(self, on: FunctionContext) -> None:
         super().__init__(on)
         self._dynamics = InverseDynamics(on.access.description, on.access.motion.cycle.dynamics.payload)
 
@@ -240,7 +240,7 @@ class PoseFunctions(Family):
     @costs(280)
     def get_mass_matrix(self, q: Joints | None = None, include_rotors_inertia: object = True) -> Array:
         """Return the inertia matrix of the joints with the declared payload [kg m^2]."""
-        self._dynamics.believe(self._access.motion.cycle.dynamics.bodies)
+        self._dynamics.use_bodies(self._access.motion.cycle.dynamics.bodies)
         matrix = self._dynamics.inertia(self._posture(q))
         matrix = np.triu(matrix) + np.triu(matrix, 1).T
         if include_rotors_inertia:

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from tvist_controller.instruments.peripherals import MAX_INTEGER, MIN_INTEGER
 from tvist_controller.programs.arguments import Bit, Flag, Number, Share, either, integer, shown, whole
-from tvist_controller.programs.functions.family import Family, Parts, described
+from tvist_controller.programs.functions.family import FunctionContext, FunctionGroup, described
 from tvist_protocol.io import BITS, NUMBERS, Bank
 from tvist_urscript import Array, Fault, costs
 
@@ -31,8 +31,8 @@ NumberPlace = Annotated[int, whole(0, NUMBERS - 1)]
 FlagPlace = Annotated[int, whole(0, FLAGS - 1)]
 
 
-def _register(what: str, place: object, bank: Bank) -> Callable[[Family, int], bool | float]:
-    def get(self: Family, address: int) -> bool | float:
+def _register(what: str, place: object, bank: Bank) -> Callable[[FunctionGroup, int], bool | float]:
+    def get(self: FunctionGroup, address: int) -> bool | float:
         return self._peripherals.read(bank, address)
 
     return described(get, what, address=place)
@@ -40,8 +40,8 @@ def _register(what: str, place: object, bank: Bank) -> Callable[[Family, int], b
 
 def _terminal(
     bits: Literal["digital_inputs", "digital_outputs"], what: str, place: object
-) -> Callable[[Family, int], bool]:
-    def get(self: Family, n: int) -> bool:
+) -> Callable[[FunctionGroup, int], bool]:
+    def get(self: FunctionGroup, n: int) -> bool:
         return bool(getattr(self._peripherals, bits) >> n & 1)
 
     return described(get, what, n=place)
@@ -50,20 +50,20 @@ def _terminal(
 _input, _output = partial(_terminal, "digital_inputs"), partial(_terminal, "digital_outputs")
 
 
-def _sets(what: str, place: object) -> Callable[[Family, int, Flag], None]:
+def _sets(what: str, place: object) -> Callable[[FunctionGroup, int, Flag], None]:
     @costs(10)
-    def set_one(self: Family, n: int, b: Flag) -> None:
+    def set_one(self: FunctionGroup, n: int, b: Flag) -> None:
         self._arm.then(lambda: self._peripherals.set_digital_outputs(1 << n, b << n))
 
     return described(set_one, what, n=place)
 
 
-class RegisterFunctions(Family):
+class RegisterFunctions(FunctionGroup):
     """Registers and flags of one robot."""
 
     title = "Registers and flags"
 
-    def __init__(self, on: Parts) -> None:
+    def __init__(self, on: FunctionContext) -> None:
         super().__init__(on)
         self._flags = [False] * FLAGS
 
@@ -115,7 +115,7 @@ class RegisterFunctions(Family):
         self._arm.then(write)
 
 
-class TerminalFunctions(Family):
+class TerminalFunctions(FunctionGroup):
     """Terminals of one robot."""
 
     title = "Inputs and outputs"

@@ -27,7 +27,7 @@ class PortSession(ABC):
     _control: ConnectionControl
     _send: Send
     over = False  # whether the connection is closed, or the client has asked to close it
-    client_begins = False
+    only_answers = False
     """Whether the client only gets what it requests. Unless `served`, it may be disconnected to make room."""
     served = False
     """Whether the client is receiving data that it subscribed to: it may then be silent, but must read."""

@@ -185,7 +185,7 @@ class ClientConnection(asyncio.BufferedProtocol):
 
     @property
     def dispensable(self) -> bool:
-        return self.session.client_begins and not self.session.served
+        return self.session.only_answers and not self.session.served
 
     def disconnect(self) -> None:
         """Close the connection at once, even if data is still unsent."""

@@ -219,7 +219,7 @@ def find(line: str) -> tuple[Command, str] | None:
 class DashboardSession(InTurnSession[str]):
     """One client of the dashboard. Answers keep their order, but a `stop` takes effect when it is read."""
 
-    client_begins = True
+    only_answers = True
     most_waiting = 256  # lines: a `stop` after fewer lines is read at once; at most 1 MB a client
     _lines: LineSplitter = field(default_factory=partial(LineSplitter, LONGEST), init=False)
     _rests: Deferred[bool] | None = field(default=None, init=False)  # waits for the arm to rest

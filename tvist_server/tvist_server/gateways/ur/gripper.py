@@ -14,7 +14,7 @@ AskGripper = Callable[[bytes, Callable[[bytes], None]], None]
 class GripperSession(PortSession):
     """Passes requests to the gripper in the controller."""
 
-    client_begins = True
+    only_answers = True
     waiting = 0
     _ask: AskGripper
     _soon: Callable[[Callable[[], None]], None]  # runs a function in the interfaces' thread

@@ -37,7 +37,7 @@ class RtdeSession(PortSession):
     are not computed at the ticks of fast clients.
     """
 
-    client_begins = True
+    only_answers = True
 
     def __init__(
         self, robot: UrRobot, control: ConnectionControl, send: Send, encoders: Mapping[int, PackageEncoder]

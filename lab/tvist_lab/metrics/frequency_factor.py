@@ -47,7 +47,7 @@ def unexplained(alpha: Floats, f_d: Floats, zeta: Floats) -> Floats:
     return left
 
 
-class RingListener:
+class FrequencyFactorEstimator:
     """Finds the common factor between the frequencies after a stop and a model's, f_d = e^u f_model(q).
 
     The amplitudes of the modes enter linearly and are eliminated (variable projection; Golub and Pereyra,
@@ -63,10 +63,10 @@ class RingListener:
         self._models = [
             Modal(mass, _standing(rows, float(base)), modes=min(MODES, len(rows[0]))) for base in BASES
         ]
-        self._heard: list[Floats] = []
+        self._likelihoods: list[Floats] = []
         self._base: int | None = None
 
-    def study(self, alpha: Floats, q: Floats) -> list[tuple[float, float]]:
+    def estimate(self, alpha: Floats, q: Floats) -> list[tuple[float, float]]:
         """Return u and its standard error [-] from the ring-down in a pose; none if the arm hardly vibrated.
 
         `alpha` [m/s²], shape (T, 3), are readings from the stop on, with gravity; `q` [rad] has shape (n,).
@@ -84,14 +84,14 @@ class RingListener:
         likely = -0.5 * alpha.size / CORRELATED_SAMPLES * np.log(left / left.min())
         if self._base is not None:
             return _certain([likely[0]])
-        self._heard.append(likely)
-        if len(self._heard) < FIRST:
+        self._likelihoods.append(likely)
+        if len(self._likelihoods) < FIRST:
             return []
         self._base = int(
-            np.argmax(np.max(sum(map(_blurred, self._heard)) - 0.5 * (SCALES / EXPECTED) ** 2, axis=1))
+            np.argmax(np.max(sum(map(_blurred, self._likelihoods)) - 0.5 * (SCALES / EXPECTED) ** 2, axis=1))
         )
-        heard, self._heard = self._heard, []
-        return _certain([one[self._base] for one in heard])
+        likelihoods, self._likelihoods = self._likelihoods, []
+        return _certain([one[self._base] for one in likelihoods])
 
 
 def _certain(likelihoods: Iterable[Floats]) -> list[tuple[float, float]]:

@@ -8,7 +8,7 @@ import pinocchio as pin
 from tvist_plant.model import FLANGE, FlexibleModel, Floats
 
 
-class Outside:
+class ExternalForces:
     """Torques and wrenches that act until they are changed."""
 
     def __init__(self, flexible: FlexibleModel) -> None:

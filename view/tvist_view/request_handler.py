@@ -14,7 +14,7 @@ from tvist_client.robot import Robot
 from tvist_protocol.errors import ProtocolError, RefusedError
 from tvist_protocol.info import Info
 from tvist_protocol.stream import Event, State, Truth
-from tvist_view import asked
+from tvist_view import tab_messages
 from tvist_view.described import usual
 from tvist_view.look import Look
 from tvist_view.pilot import Pilot, carry, declare, go, motion
@@ -68,7 +68,7 @@ def _curves(look: Look, *runs: MotionRecord) -> dict[str, Any]:
 
 
 @dataclass
-class Doer:
+class RequestHandler:
     """Moves one robot as its tabs request."""
 
     robot: Robot
@@ -79,53 +79,53 @@ class Doer:
     result: Callable[[dict[str, Any]], None]  # shows the result of a comparison in all tabs
     comparing: str | None = None  # present step of a comparison, in words; None if there is none
 
-    async def do(self, info: Info, tab: int, message: asked.Message) -> None:
+    async def do(self, info: Info, tab: int, message: tab_messages.Message) -> None:
         """Carry out a tab's request."""
         pilot = self.pilot
         match message:
-            case asked.Stop():
+            case tab_messages.Stop():
                 await pilot.stop()
-            case asked.Take():
+            case tab_messages.Take():
                 await pilot.take(tab)
-            case asked.Give():
+            case tab_messages.Give():
                 await pilot.give_back(tab)
-            case asked.Move() | asked.Compare():
+            case tab_messages.Move() | tab_messages.Compare():
                 await self._go(info, tab, message)
-            case asked.Carry(mass):
+            case tab_messages.Carry(mass):
                 pilot.do(tab, lambda arm: carry(arm, mass))
-            case asked.Jog(joint):
+            case tab_messages.Jog(joint):
                 self.say(f"joint is {joint}: must be 0 to {len(info.joints) - 1}")
             case _:
                 await self._change(info, tab, message)
 
-    async def _change(self, info: Info, tab: int, message: asked.Message) -> None:
+    async def _change(self, info: Info, tab: int, message: tab_messages.Message) -> None:
         """Change a setting, also while the arm moves."""
         pilot = self.pilot
         match message:
-            case asked.Shape(shaper, modes):
+            case tab_messages.Shape(shaper, modes):
                 if await pilot.take(tab):
                     await pilot.set(tab, lambda arm: arm.set_shaper(shaper, modes=modes or info.modes))
-            case asked.Speed(fraction):
+            case tab_messages.Speed(fraction):
                 await pilot.set(tab, lambda arm: arm.set_speed(fraction))
-            case asked.Declare(mass):
+            case tab_messages.Declare(mass):
                 await pilot.set(tab, lambda arm: declare(arm, mass))
-            case asked.Fault(name):
+            case tab_messages.Fault(name):
                 await pilot.set(tab, lambda arm: arm.inject(name))
-            case asked.Ready():
+            case tab_messages.Ready():
                 if await pilot.take(tab):
                     await pilot.set(tab, pilot.make_ready)
 
-    async def _go(self, info: Info, tab: int, message: asked.Move | asked.Compare) -> None:
+    async def _go(self, info: Info, tab: int, message: tab_messages.Move | tab_messages.Compare) -> None:
         ends = message.first, message.last
         if unknown := [name for name in ends if name not in info.poses]:
             self.say(f"the robot has no pose {unknown[0]}: choose one of {', '.join(info.poses)}")
         elif await self.pilot.take(tab):
-            if isinstance(message, asked.Move):
+            if isinstance(message, tab_messages.Move):
                 self.pilot.do(tab, lambda arm: motion(arm, [info.poses[name] for name in ends]))
             else:
                 self.pilot.do(tab, lambda arm: self._compare(arm, message))
 
-    async def _compare(self, arm: Arm, message: asked.Compare) -> None:
+    async def _compare(self, arm: Arm, message: tab_messages.Compare) -> None:
         """Make a motion without and with a shaper, show both and their comparison, and restore the shaper."""
         info = await self.robot.info()
         shaper = message.shaper if message.shaper not in {"", "none"} else usual(info)

@@ -7,10 +7,10 @@ import numpy as np
 from tvist_controller.kinematics.inverse import InverseKinematics, InverseKinematicsError
 from tvist_controller.kinematics.pose import Placement, placement
 from tvist_controller.line.differentiator import Floats
-from tvist_controller.paths.legs import JointWay, Leg, LegSpeed
+from tvist_controller.paths.legs import JointCurve, Leg, LegSpeed
 from tvist_controller.paths.pacing import timed
-from tvist_controller.paths.tool_curves import PER_RADIAN, SHORTEST, ToolArc, ToolLine, ToolWay
-from tvist_controller.paths.tracking import Tracker, WayError
+from tvist_controller.paths.tool_curves import PER_RADIAN, SHORTEST, BlendableCurve, ToolArc, ToolLine
+from tvist_controller.paths.tracking import Tracker, TrackingError
 from tvist_controller.planning.snapshot import PlanningState
 from tvist_controller.refusal import RefusalError, check_joints
 from tvist_controller.trajectory.spline import Knots
@@ -20,7 +20,7 @@ from tvist_protocol import motions as m
 from tvist_protocol.replies import Posture, ToolPose
 
 
-class Reachable:
+class KinematicPlanner:
     """Answers kinematic queries and creates the parts of paths for one robot."""
 
     def __init__(self, description: RobotDescription) -> None:
@@ -53,7 +53,7 @@ class Reachable:
         return ToolPose(pose=found.vector)
 
     def refusal(
-        self, error: WayError, field: str, share: float, goal: Placement, tcp: Sequence[float]
+        self, error: TrackingError, field: str, share: float, goal: Placement, tcp: Sequence[float]
     ) -> RefusalError:
         """Return the refusal of a path possible up to a share of the way, 0 to 1; `field`: the command's."""
         at = f"{field}: after {100.0 * share:.0f} % of the way, at {_shown(error.pose)}"
@@ -77,10 +77,10 @@ class Reachable:
         frame, q = placement(command.frame), now.q
         for segment, where in _segments(command, 0 if now.after is None else now.after.segments):
             start = tracker.pose(q)
-            way: ToolWay | JointWay
+            way: BlendableCurve | JointCurve
             match segment:
                 case m.JointSegment():
-                    way = JointWay(q, np.array(segment.q, dtype=float))
+                    way = JointCurve(q, np.array(segment.q, dtype=float))
                 case m.ArcSegment() | m.MoveC():
                     via = frame @ placement(segment.via)
                     end = frame @ placement(segment.pose)
@@ -95,21 +95,21 @@ class Reachable:
             if way.length < SHORTEST:
                 continue
             knots = self._along(way, q, tracker, where, now)
-            q = way.end if isinstance(way, JointWay) else knots.q[-1]
+            q = way.end if isinstance(way, JointCurve) else knots.q[-1]
             pacing = timed(_pacing(segment), way.length)
             blend = 0.0 if isinstance(segment, m.MoveL | m.MoveC) else segment.blend
             yield Leg(way, knots, tracker.pose(q), pacing, blend, where)
 
     def _along(
-        self, way: ToolWay | JointWay, q: Floats, tracker: Tracker, where: str, now: PlanningState
+        self, way: BlendableCurve | JointCurve, q: Floats, tracker: Tracker, where: str, now: PlanningState
     ) -> Knots:
         """Return the joints' motion along a leg, checked for range."""
-        if isinstance(way, JointWay):
+        if isinstance(way, JointCurve):
             return way.part(0.0, way.length)
         field = f"{where}.pose".removeprefix(".")
         try:
             knots = tracker.follow(way, q)
-        except WayError as error:
+        except TrackingError as error:
             goal, share = way.at(way.length).pose, error.s / way.length
             raise self.refusal(error, field, share, goal, now.tcp) from error
         self.check_range(knots.s / way.length, knots.q, field)
