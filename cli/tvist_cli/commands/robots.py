@@ -26,7 +26,7 @@ def robots(
     Args:
         robot: Show all that is known about these robots: names that come with the package, or paths of robot
             files (TOML or URDF) [a table of every robot that comes with the package].
-        measure: Let each arm make random moves with its rated payload, unshaped and with the shaper auto, and
+        measure: Let each arm make random moves with its own payload, unshaped and with the shaper auto, and
             compare its modes with its calibration, and its sag with gravity divided by stiffness. An arm without a
             calibration is identified first.
         random: Make this number of random moves for each measurement.

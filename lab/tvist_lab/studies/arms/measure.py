@@ -39,7 +39,7 @@ def measure(
     seed: int,
     progress: Callable[[int], None] = lambda _: None,
 ) -> dict[str, Any]:
-    """Measure an arm with gears and links `stiffness` times as stiff, by random `moves` with the rated payload.
+    """Measure an arm with gears and links `stiffness` times as stiff, by random `moves` with its payload.
 
     Without a calibration, the arm is identified first. Returns the factor `stiffness`; `calibration`, its
     name or "identified"; `f_d_error_percent`, the median error of each mode; the numbers of `moves`, of moves
