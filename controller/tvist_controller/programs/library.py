@@ -15,7 +15,7 @@ from tvist_controller.programs.functions.setup import SetupFunctions
 from tvist_controller.programs.functions.sockets import SocketFunctions
 from tvist_controller.programs.functions.state import PoseFunctions, StateFunctions
 from tvist_controller.programs.functions.terminals import RegisterFunctions, TerminalFunctions
-from tvist_controller.programs.functions.unsimulated import MISSING, SUBJECTS
+from tvist_controller.programs.functions.unsimulated import SUBJECTS
 from tvist_urscript import Signature, Signatures, names, signatures
 
 FAMILIES: tuple[type[Family], ...] = (
@@ -47,13 +47,17 @@ def known_signatures() -> Signatures:
     """Return the signature of each function; the language's own are in `tvist_urscript`."""
     return {
         **{name: one for family in FAMILIES for name, one in signatures(family).items()},
-        **{name: Signature(given) for name, (given, _) in SUBJECTS.items()},
+        **{
+            name: Signature(given, fails=f"this controller does not simulate {subject}")
+            for name, (given, subject) in SUBJECTS.items()
+        },
     }
 
 
 def functions(parts: Parts) -> dict[str, Callable[..., Any]]:
     """Return the functions for the programs of one robot, by name."""
-    joints, found = parts.access.description.joints, dict(MISSING)
+    joints = parts.access.description.joints
+    found: dict[str, Callable[..., Any]] = {}
     for family in FAMILIES:
         subject = family(parts)
         found |= {name: checked(getattr(subject, name), joints) for name in names(family)}
