@@ -50,10 +50,11 @@ def test_a_polyscope_preamble_is_accepted_and_its_settings_show_in_rtde():
         *PREAMBLE,
         '$ 1 "Robot Program"',
         "textmsg([get_gravity(), get_base_acceleration(), get_tool_current(), motion_version_get()])",
+        'varmsg("Camera", [1, True])',
     )
     assert failure(robot) is None
     assert robot.warnings() == []
-    assert said(robot) == ["[[0, 0, 9.82], [0, 0, 0], 0, 1]"]
+    assert said(robot) == ["[[0, 0, 9.82], [0, 0, 0], 0, 1]", "Camera = [1, True]"]
     snapshot = Instruments(UR5E).snapshot(robot.states[-1], robot.controller.io())
     assert (snapshot.tool_analog_input_types, snapshot.tool_output_mode) == (2, 1)
     assert (snapshot.tool_digital_output0_mode, snapshot.tool_digital_output1_mode) == (2, 3)

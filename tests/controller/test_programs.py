@@ -117,6 +117,8 @@ FORCE = "force_mode(p[0,0,0,0,0,0], {}, [0,0,1,0,0,0], {}, {})"
     ('socket_open("h", 70000)', "port is 70000"),
     ("socket_read_binary_integer(31)", "number is 31"),
     ("socket_send_int(2147483648)", "value is"),
+    ("movej()", "movej needs a value for its parameter q"),
+    ('rpc_factory("xmlrpc", "http://1.2.3.4")', "does not simulate remote procedure calls"),
     ("direct_torque([0, 0, 0, 0, 0, 0])", "does not simulate torque control"),
     ("set_tool_analog_input_domain(2, 0)", "port is 2: it must be from 0 to 1"),
     ("set_tool_output_mode(2)", "mode is 2: it must be from 0 to 1"),

@@ -1,4 +1,4 @@
-"""Errors that the checker finds, and limits of a script's size."""
+"""Errors and warnings that the checker finds, and limits of a script's size."""
 
 import pytest
 from tests.conformance.served import finished
@@ -9,17 +9,28 @@ KNOWN = {"textmsg": Signature(parameters("a", b=""))}
 
 
 def places(text):
-    return [(error.line, error.column, error.text) for error in check(text, KNOWN)]
+    return [(error.line, error.column, error.text) for error in check(text, KNOWN).errors]
 
 
 def test_all_unknown_names_are_reported_in_text_order():
-    found = places("def f():\n  x = b + a(c)\n  y(1)\n  textmsg(1, 2, 3)\nend")
-    assert found == [
+    assert places("def f():\n  x = b + a(c)\n  y(1)\nend") == [
         (2, 7, "compile_error_name_not_found:b:"),
         (2, 11, "compile_error_name_not_found:a:"),
         (2, 13, "compile_error_name_not_found:c:"),
         (3, 3, "compile_error_name_not_found:y:"),
-        (4, 17, "textmsg takes at most 2 arguments, but 3 are given"),
+    ]
+
+
+def test_calls_that_cannot_work_are_warnings_beside_errors():
+    known = KNOWN | {"rpc": Signature((), fails="no simulation")}
+    text = "def f():\n  textmsg(1, 2, x)\n  rpc(y)\n  def g(a):\n  end\n  g(rpc())\n  g()\nend"
+    errors, warnings = check(text, known)
+    assert [(one.line, one.column) for one in errors] == [(2, 17), (3, 7)]
+    assert [(one.line, one.column, one.text) for one in warnings] == [
+        (2, 17, "textmsg takes at most 2 arguments, but 3 are given"),
+        (3, 3, "rpc: no simulation"),
+        (6, 5, "rpc: no simulation"),
+        (7, 3, "g needs a value for its parameter a"),
     ]
 
 
@@ -95,7 +106,10 @@ def test_a_program_without_def_is_named_after_its_first_word():
         ("  movej([0, 0, 0, 0, 0, 0])\n  x = sqrt(2)\n", []),  # movej may be the robot's
         (
             "  movej(q)\n  x = sqrt(1, 2)\n",
-            ["2:9: compile_error_name_not_found:q:", "3:15: sqrt takes at most 1 argument, but 2 are given"],
+            [
+                "2:9: compile_error_name_not_found:q:",
+                "3:15: warning: sqrt takes at most 1 argument, but 2 are given",
+            ],
         ),
     ],
 )

@@ -1,4 +1,4 @@
-"""Print the errors of a script: `python -m tvist_urscript FILE`."""
+"""Print the errors and warnings of a script: `python -m tvist_urscript FILE`."""
 
 import re
 import sys
@@ -31,9 +31,11 @@ def main(arguments: list[str]) -> int:
         print(f"{path} cannot be read: {unreadable.strerror}", file=sys.stderr)
         return 2
     lines = text.split("\n")
-    errors = [error for error in check(text, ARRAYS) if not _is_of_robot(error, lines)]
-    for error in errors:
-        print(f"{path}:{error.line}:{error.column}: {error.text}")
+    found = check(text, ARRAYS)
+    errors = [error for error in found.errors if not _is_of_robot(error, lines)]
+    kinds = ("", errors), ("warning: ", found.warnings)
+    for kind, error in [(kind, error) for kind, them in kinds for error in them]:
+        print(f"{path}:{error.line}:{error.column}: {kind}{error.text}")
     return 1 if errors else 0
 
 

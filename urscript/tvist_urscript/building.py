@@ -86,6 +86,10 @@ class Builder(Transformer[Token, Any]):
         node = tree.Assign(inner.line, inner.column, inner, indices, value, declared)
         return _deeper(node, indices, [value])
 
+    def chained(self, *parts: Any) -> None:
+        _, equal, _ = parts
+        raise no_program(equal, "a statement assigns one variable: give `a = b = 1` a line for each")
+
     def either(self, *values: Any, operator: Literal["or", "xor", "and"] = "or") -> tree.Logic:
         first, *_ = values
         return _deeper(tree.Logic(first.line, first.column, operator, [*values]), values)

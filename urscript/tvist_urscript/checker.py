@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator
 from dataclasses import fields
+from typing import NamedTuple
 
 from tvist_urscript import tree
 from tvist_urscript.compiler import program_of, translate
@@ -11,18 +12,37 @@ from tvist_urscript.names import scopes
 from tvist_urscript.signatures import Signatures
 
 
-def check(text: str, signatures: Signatures) -> list[ScriptError]:
-    """Return the errors of a script in the order of the text; an empty list if it can run.
+class Findings(NamedTuple):
+    """What needs attention in a script, in the order of the text."""
 
-    If the syntax is wrong, the only error is at the first token that does not fit. Else the errors are all
-    unknown names, and all calls that do not fit their functions.
+    errors: list[ScriptError]  # a script with errors cannot run
+    warnings: list[ScriptError]
+
+
+def check(text: str, signatures: Signatures) -> Findings:
+    """Return the errors and warnings of a script.
+
+    If the syntax is wrong, the only error is at the first token that does not fit. Else the errors are mainly
+    unknown names. Warnings are calls that fail when the program reaches them, since the function is not
+    simulated or the arguments do not fit; and, if there are no errors, constructs that a UR robot rejects or
+    reads differently, and a text that only defines functions.
     """
-    return translate(text, signatures)[1]
+    try:
+        program = program_of(text)
+    except ScriptError as error:
+        return Findings([error], [])
+    script, errors, warnings = translate(text, program, signatures)
+    if script is not None:
+        warnings += _unportable(text, program)
+        if script.idle:
+            why = "the text only defines functions: as a program, it ends at once"
+            warnings.append(ScriptError(1, 1, why))
+    return Findings(errors, sorted(warnings, key=lambda warning: (warning.line, warning.column)))
 
 
-def unportable(text: str) -> list[ScriptError]:
+def _unportable(text: str, root: tree.Function) -> list[ScriptError]:
     """Return what a real UR robot would refuse in a script that has no errors here."""
-    program, *inner = scopes(program_of(text))
+    program, *inner = scopes(root)
     assigned = [node for node in _nodes(program.function) if isinstance(node, tree.Assign)]
     own = program.globals - {node.target.name for node in assigned if node.qualifier == "global"}
     found = _framed_short(text)
@@ -56,6 +76,8 @@ def _framed_short(text: str) -> list[ScriptError]:
     lines, begun = text.split("\n"), 0
     for number, line in enumerate(lines, 1):
         if re.match(r"end\b", line):
+            if begun == 0 and not any(lines[number:]):
+                return []  # the piece is the whole text, which has no errors
             try:
                 parse("\n".join([*lines[begun:number], ""]))
             except ScriptError:

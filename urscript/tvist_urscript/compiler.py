@@ -4,6 +4,7 @@ import ast
 import re
 from collections.abc import Iterator
 from types import CodeType, MappingProxyType
+from typing import NamedTuple
 
 from tvist_urscript import tree
 from tvist_urscript.errors import ScriptError, no_program, syntax_error
@@ -26,54 +27,59 @@ def compile_script(text: str, signatures: Signatures, after: Script | None = Non
     Raises:
         ScriptError: The first error in the order of the text.
     """
-    script, errors = translate(text, signatures, after)
+    program = program_of(text) if after is None else _statements(text)
+    script, errors, _ = translate(text, program, signatures, after)
     if errors:
         raise errors[0]
     assert script is not None
     return script
 
 
+class Translation(NamedTuple):
+    """A compiled program; errors, and calls that fail when they are reached, are in the order of the text."""
+
+    script: Script | None  # None if there are errors
+    errors: list[ScriptError]
+    warnings: list[ScriptError]
+
+
 def translate(
-    text: str, signatures: Signatures, after: Script | None = None
-) -> tuple[Script | None, list[ScriptError]]:
-    """Compile a program; return it, or None and its errors in the order of the text."""
+    text: str, program: tree.Function, signatures: Signatures, after: Script | None = None
+) -> Translation:
+    """Compile a program, given as text and tree."""
     from tvist_urscript.library import PURE
 
     known = {**{name: entry[0] for name, entry in PURE.items()}, **signatures}
-    errors: dict[tuple[int, int, str], ScriptError] = {}
-
-    def report(at: tree.Node, why: str) -> None:
-        errors.setdefault((at.line, at.column, why), ScriptError(at.line, at.column, why))
-
-    try:
-        program = program_of(text) if after is None else _statements(text)
-    except ScriptError as error:
-        return None, [error]
+    errors: set[tuple[int, int, str]] = set()
+    warnings: set[tuple[int, int, str]] = set()
     found = scopes(program) if after is None else scopes(program, after.scope, after.scopes)
     if len(found) > MOST_FUNCTIONS:
         head = found[MOST_FUNCTIONS].function
         why = f"a program of {len(found)} functions is too long: the limit is {MOST_FUNCTIONS}"
-        return None, [ScriptError(head.line, head.column, why)]
-    translator = Functions(known, report)
-    trees = [made for scope in found for made in translator.function(scope)]
-    if errors:
-        return None, [errors[key] for key in sorted(errors)]
-    return (
-        Script(
-            program.name,
-            program.kind == "sec",
-            text,
-            found[0].code_name,
-            tuple(map(_code, trees)),
-            MappingProxyType(translator.constants),
-            frozenset(translator.used),
-            outline(found[0]),
-            found[0].number + len(found),
-            bool(program.body) and all(isinstance(one, tree.Function) for one in program.body),
-            frozenset(line for scope in found for line in _last_lines(scope.function.body)),
-        ),
-        [],
+        return Translation(None, [ScriptError(head.line, head.column, why)], [])
+    translator = Functions(
+        known,
+        report=lambda at, why: errors.add((at.line, at.column, why)),
+        warn=lambda at, why: warnings.add((at.line, at.column, why)),
     )
+    trees = [made for scope in found for made in translator.function(scope)]
+    late = [ScriptError(*one) for one in sorted(warnings)]
+    if errors:
+        return Translation(None, [ScriptError(*one) for one in sorted(errors)], late)
+    script = Script(
+        program.name,
+        program.kind == "sec",
+        text,
+        found[0].code_name,
+        tuple(map(_code, trees)),
+        MappingProxyType(translator.constants),
+        frozenset(translator.used),
+        outline(found[0]),
+        found[0].number + len(found),
+        bool(program.body) and all(isinstance(one, tree.Function) for one in program.body),
+        frozenset(line for scope in found for line in _last_lines(scope.function.body)),
+    )
+    return Translation(script, [], late)
 
 
 def program_of(text: str) -> tree.Function:

@@ -26,12 +26,20 @@ EQUALITY = {"==": "is_equal", "!=": "is_unequal"}
 Report = Callable[[tree.Node, str], None]
 
 
-class Expressions:
-    """Translates expressions."""
+class Misfit(Exception):  # noqa: N818  no error of the text: the program fails when it reaches the call
+    """A call cannot work, for a reason that may be at one of its arguments."""
 
-    def __init__(self, signatures: Signatures, report: Report) -> None:
+    def __init__(self, at: tree.Node, why: str) -> None:
+        super().__init__(why)
+        self.at, self.why = at, why
+
+
+class Expressions:
+    """Translates expressions, and reports errors, which prevent the start, and warnings."""
+
+    def __init__(self, signatures: Signatures, report: Report, warn: Report) -> None:
         self.signatures = signatures
-        self.report = report
+        self.report, self.warn = report, warn
         self.scope: Scope  # names that the function being translated can use
         self.cost = 0  # evaluations of the code translated since this was reset
         self.works = False  # whether code translated since the reset may work on lists, which costs more
@@ -93,7 +101,7 @@ class Expressions:
     def name(self, node: tree.Name) -> ast.expr:
         variable = self.scope.variable(node.name)
         if variable is None:
-            self.report(node, name_not_found(node.name))
+            self.report(node, name_not_found(node.name) + self.scope.hint(node.name))
         return located(name(f"v_{node.name}" if variable == "local" else f"g_{node.name}"), node)
 
     def binary(self, node: tree.Binary) -> ast.expr:
@@ -164,6 +172,18 @@ class Expressions:
         return located(self.call(tree.Call(node.line, node.column, name, given), built_in=True), node)
 
     def call(self, node: tree.Call, *, built_in: bool = False) -> ast.expr:
+        """Translate a call; one that cannot work fails when the program reaches it."""
+        try:
+            return self.working_call(node, built_in=built_in)
+        except Misfit as misfit:
+            return self.failing(misfit.at, misfit.why)
+
+    def failing(self, at: tree.Node, why: str) -> ast.expr:
+        """Warn of a call that cannot work, and translate it to one that ends the program."""
+        self.warn(at, why)
+        return located(call("fail", ast.Constant(why)), at)
+
+    def working_call(self, node: tree.Call, *, built_in: bool) -> ast.expr:
         """Translate a call; a function of the script hides the controller's function of the same name."""
         self.cost += 1
         scope = None if built_in else self.scope.find(node.name)
@@ -179,10 +199,12 @@ class Expressions:
             deeper = ast.BinOp(name(DEPTH), ast.Add(), ast.Constant(1))
             return ast.YieldFrom(call(scope.code_name, deeper, *self.arguments(node, parameters)))
         signature = self.signatures.get(node.name)
-        if signature is None:
-            self.report(node, name_not_found(node.name))
+        if signature is None or signature.fails:
             for argument in node.arguments:
                 self.value(argument.value)
+            if signature is not None:
+                raise Misfit(node, f"{node.name}: {signature.fails}")
+            self.report(node, name_not_found(node.name))
             return ast.Constant(None)
         self.used.add(node.name)
         self.cost += signature.cost - 1
@@ -200,18 +222,20 @@ class Expressions:
         """Return a call's arguments in the parameters' order; they are computed in the order of the text.
 
         A parameter is a tuple of its name and the name of its default, or None if it has none.
+
+        Raises:
+            Misfit: There are too many arguments, or a parameter without default gets none.
         """
         given: dict[str, ast.expr] = {}
         names = [name for name, _ in parameters]
-        for place, argument in enumerate(node.arguments):
-            value = self.value(argument.value)
+        values = [self.value(argument.value) for argument in node.arguments]
+        for place, (argument, value) in enumerate(zip(node.arguments, values, strict=True)):
             parameter = argument.name
             if parameter is None:
                 if place >= len(names):
                     counted = "1 argument" if len(names) == 1 else f"{len(names)} arguments"
                     limit = f"at most {counted}" if names else "no arguments"
-                    self.report(argument, f"{node.name} takes {limit}, but {len(node.arguments)} are given")
-                    return []
+                    raise Misfit(argument, f"{node.name} takes {limit}, but {len(node.arguments)} are given")
                 if place and node.arguments[place - 1].name is not None:
                     self.report(argument, "an argument without a name follows one with a name")
                 parameter = names[place]
@@ -224,8 +248,7 @@ class Expressions:
         for parameter, default in parameters:
             if parameter not in given:
                 if default is None:
-                    self.report(node, f"{node.name} needs a value for its parameter {parameter}")
-                    return []
+                    raise Misfit(node, f"{node.name} needs a value for its parameter {parameter}")
                 given[parameter] = name(default)
         return _arranged(given, names)
 
@@ -267,6 +290,8 @@ class Expressions:
         arguments = self.items([argument.value for argument in node.arguments])
         if METHOD not in self.signatures:
             self.report(node, name_not_found(f"{METHOD}{node.name}"))
+        elif why := self.signatures[METHOD].fails:
+            return self.failing(node, f"{node.name}: {why}")
         self.used.add(METHOD)
         return call(f"b_{METHOD}", value, ast.Constant(node.name), arguments)
 

@@ -3,6 +3,7 @@
 import ast
 
 from tvist_urscript import tree
+from tvist_urscript.errors import Fault
 from tvist_urscript.failures import TooDeep
 from tvist_urscript.names import Scope
 from tvist_urscript.pieces import DEPTH, MISSING, assign, branch, call, charge, compare, located, name
@@ -21,6 +22,11 @@ PART, PART_NODES = 200, 1000
 def too_deep() -> None:
     """End the program if calls are nested too deep."""
     raise TooDeep(f"functions are called more than {DEEPEST_CALLS} deep")
+
+
+def fail(why: str) -> None:
+    """End the program at a call that can only fail."""
+    raise Fault(why)
 
 
 class Functions(Statements):

@@ -8,7 +8,7 @@ from typing import Any
 
 from tvist_urscript.errors import Fault, ScriptError
 from tvist_urscript.failures import FILE, all_lines_of, failure, line_of, name_of, position_of
-from tvist_urscript.functions import too_deep
+from tvist_urscript.functions import fail, too_deep
 from tvist_urscript.namespace import Namespace
 from tvist_urscript.pieces import HERE, MISSING
 from tvist_urscript.script import Script
@@ -69,6 +69,7 @@ class Machine:
             "halt": halt,
             "label": self._label,
             "too_deep": too_deep,
+            "fail": fail,
         }
         self._names = Namespace(script, functions, self.charge, called)
         self._main = self._running = Thread(0, self._body(self._names[script.main]), None)

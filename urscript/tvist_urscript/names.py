@@ -66,6 +66,20 @@ class Scope:
             scope = scope.outer
         return None
 
+    def hint(self, name: str) -> str:
+        """Return how to make an unknown name known if a function of the program assigns it; else nothing."""
+        scope = self
+        while scope.outer is not None:
+            scope = scope.outer
+        waiting = [scope]
+        while waiting:
+            scope = waiting.pop()
+            if name in scope.assigned:
+                title = scope.function.name
+                return f" {name} is assigned in {title}, but local to it: declare it global there"
+            waiting += reversed(scope.functions.values())
+        return ""
+
 
 def outline(scope: Scope) -> Scope:
     """Return a copy of an outermost scope without function bodies, which compiles statements added later."""

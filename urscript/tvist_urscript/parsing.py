@@ -31,7 +31,9 @@ loop: WHILE expression ":" block "end"
     | (HALT | ENTER_CRITICAL | EXIT_CRITICAL) ("(" ")")? -> word
     | LABEL -> label
 
-assign: (GLOBAL | LOCAL)? postfix EQUAL expression
+assign: (GLOBAL | LOCAL)? postfix EQUAL assigned
+?assigned: expression
+    | postfix EQUAL assigned -> chained
 
 ?expression: either
 ?either: unequal ("or" unequal)*

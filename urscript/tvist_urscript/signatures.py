@@ -29,12 +29,14 @@ class Signature:
         cost: Evaluations that a call takes from the budget.
         linear: Whether a call also takes a cost for the elements of list arguments and results. The
             machine charges for this in the functions that it adds itself.
+        fails: Why each call fails when the program reaches it; empty for functions that work.
     """
 
     parameters: tuple[Parameter, ...]
     blocks: bool = False
     cost: int = 1
     linear: bool = False
+    fails: str = ""
 
     @property
     def required(self) -> int:

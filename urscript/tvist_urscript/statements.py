@@ -22,8 +22,8 @@ Link = tuple[tree.Node, ast.expr, list[ast.stmt]]
 class Statements(Expressions):
     """Translates statements."""
 
-    def __init__(self, signatures: Signatures, report: Report) -> None:
-        super().__init__(signatures, report)
+    def __init__(self, signatures: Signatures, report: Report, warn: Report) -> None:
+        super().__init__(signatures, report, warn)
         self.globals: set[str] = set()  # global variables that the present function sets
         self.loops = 0  # number of loops around the present statement
         # Whether the statement is in a part of a long main function; a part returns True after a `return`.

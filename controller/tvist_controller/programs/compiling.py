@@ -7,14 +7,12 @@ from difflib import get_close_matches
 from functools import lru_cache
 from typing import Final, Literal, NamedTuple
 
-from tvist_controller.programs.functions.unsimulated import SUBJECTS
 from tvist_controller.programs.interpreter import WAITS
 from tvist_controller.programs.library import MOVING, known_signatures
 from tvist_controller.refusal import RefusalError, invalid, wrong_mode
 from tvist_plant.description import RobotDescription
 from tvist_protocol.programs import ProgramLoad, ProgramRun
-from tvist_urscript import METHOD, PURE, Script, ScriptError, check, compile_script
-from tvist_urscript.checker import unportable
+from tvist_urscript import PURE, Script, ScriptError, check, compile_script
 
 KEPT = 8  # size of the cache of compiled programs; many clients send the same text repeatedly
 MAX_KEPT = 100  # largest number of stored programs
@@ -123,7 +121,6 @@ class StoredPrograms:
         return self._kept[name]
 
 
-_SIMULATED = {name: one for name, one in known_signatures().items() if name not in SUBJECTS}
 _NAMES = {name.lower(): name for name in (*known_signatures(), *PURE)}
 _UNKNOWN = re.compile(r"compile_error_name_not_found:(\.?\w+):")
 
@@ -140,28 +137,10 @@ class ProgramFinding:
 
 
 def check_program(text: str) -> list[ProgramFinding]:
-    """Return the findings in a program's text, in order.
-
-    Errors are the compiler's: syntax, unknown names, wrong calls. Warnings are calls of functions that are not
-    simulated, constructs that a UR robot rejects or reads differently, and texts that only define functions.
-    """
-    findings = [_error(error) for error in check(text, known_signatures())]
-    # Checking again without these functions locates their calls.
-    known = {(finding.line, finding.column) for finding in findings}
-    for error in check(text, _SIMULATED):
-        unknown = _UNKNOWN.fullmatch(error.text)
-        if unknown is None or (error.line, error.column) in known:
-            continue
-        name = unknown[1].removeprefix(METHOD)
-        subject = SUBJECTS.get(name if name == unknown[1] else METHOD)
-        if subject is not None:
-            text_of_it = f"{name}: this controller does not simulate {subject[1]}"
-            findings.append(ProgramFinding(error.line, error.column, "warning", text_of_it))
-    if not known:
-        findings += [ProgramFinding(one.line, one.column, "warning", one.text) for one in unportable(text)]
-        if compile_script(text, known_signatures()).idle:
-            why = "the text only defines functions: as a program, it ends at once"
-            findings.append(ProgramFinding(1, 1, "warning", why))
+    """Return the findings in a program's text, in order; see `check`."""
+    errors, warnings = check(text, known_signatures())
+    findings = [_error(error) for error in errors]
+    findings += [ProgramFinding(one.line, one.column, "warning", one.text) for one in warnings]
     return sorted(findings, key=lambda finding: (finding.line, finding.column))
 
 

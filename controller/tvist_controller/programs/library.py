@@ -5,7 +5,7 @@ from functools import cache
 from typing import Any
 
 from tvist_controller.programs.arguments import checked
-from tvist_controller.programs.functions.family import FunctionContext, FunctionGroup
+from tvist_controller.programs.functions.group import FunctionContext, FunctionGroup
 from tvist_controller.programs.functions.force import ForceFunctions
 from tvist_controller.programs.functions.gripper import GripperFunctions
 from tvist_controller.programs.functions.motions import MotionFunctions
@@ -15,7 +15,7 @@ from tvist_controller.programs.functions.setup import SetupFunctions
 from tvist_controller.programs.functions.sockets import SocketFunctions
 from tvist_controller.programs.functions.state import PoseFunctions, StateFunctions
 from tvist_controller.programs.functions.terminals import RegisterFunctions, TerminalFunctions
-from tvist_controller.programs.functions.unsimulated import MISSING, SUBJECTS
+from tvist_controller.programs.functions.unsimulated import SUBJECTS
 from tvist_urscript import Signature, Signatures, names, signatures
 
 FUNCTION_GROUPS: tuple[type[FunctionGroup], ...] = (
@@ -46,15 +46,19 @@ MOVING = frozenset(names(MotionFunctions)) | {
 def known_signatures() -> Signatures:
     """Return the signature of each function; the language's own are in `tvist_urscript`."""
     return {
-        **{name: one for family in FUNCTION_GROUPS for name, one in signatures(family).items()},
-        **{name: Signature(given) for name, (given, _) in SUBJECTS.items()},
+        **{name: one for group in FUNCTION_GROUPS for name, one in signatures(group).items()},
+        **{
+            name: Signature(given, fails=f"this controller does not simulate {subject}")
+            for name, (given, subject) in SUBJECTS.items()
+        },
     }
 
 
 def functions(parts: FunctionContext) -> dict[str, Callable[..., Any]]:
     """Return the functions for the programs of one robot, by name."""
-    joints, found = parts.access.description.joints, dict(MISSING)
-    for family in FUNCTION_GROUPS:
-        subject = family(parts)
-        found |= {name: checked(getattr(subject, name), joints) for name in names(family)}
+    joints = parts.access.description.joints
+    found: dict[str, Callable[..., Any]] = {}
+    for group in FUNCTION_GROUPS:
+        subject = group(parts)
+        found |= {name: checked(getattr(subject, name), joints) for name in names(group)}
     return found

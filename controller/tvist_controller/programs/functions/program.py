@@ -3,7 +3,7 @@
 from typing import Annotated
 
 from tvist_controller.programs.access import OWN_TOKEN
-from tvist_controller.programs.arguments import Flag, above_zero, readable, shown, whole, within, word
+from tvist_controller.programs.arguments import Flag, Text, above_zero, readable, shown, whole, within, word
 from tvist_controller.programs.blended_moves import Turns
 from tvist_controller.programs.functions.family import FunctionGroup
 from tvist_plant.plant import PERIOD
@@ -25,6 +25,11 @@ class MessageFunctions(FunctionGroup):
         """Write a line to the log, which clients of the primary interface receive."""
         text = readable(f"{self._written(s1)}{self._written(s2)}")
         self._arm.then(lambda: self._access.emit("text", why=text))
+
+    @costs(30)
+    def varmsg(self, name: Text, value: Value) -> None:
+        """Write a variable's name and value to the log, as `textmsg`."""
+        self.textmsg(f"{name} = ", value)
 
     @costs(20)
     def popup(

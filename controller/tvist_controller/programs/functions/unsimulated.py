@@ -1,9 +1,9 @@
 """Functions of UR's controllers that are not simulated; calling one ends the program with an error."""
 
 import ast
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 
-from tvist_urscript import METHOD, Fault, Parameter, parameters
+from tvist_urscript import METHOD, Parameter, parameters
 
 _OTHERS = "remote procedure calls and Ethernet/IP"
 _CALLS = {
@@ -94,18 +94,3 @@ def _subjects(
 
 SUBJECTS: dict[str, tuple[tuple[Parameter, ...], str]] = dict(_subjects(_CALLS)) | {METHOD: ((), _OTHERS)}
 """Parameters and subject of each function."""
-
-
-def _method(_: object, name: object, __: object) -> None:
-    raise Fault(f"{name}: this controller does not simulate {_OTHERS}")
-
-
-def _missing(name: str, subject: str) -> Callable[..., None]:
-    def missing(*_: object) -> None:
-        raise Fault(f"{name}: this controller does not simulate {subject}")
-
-    return missing
-
-
-MISSING = {name: _missing(name, subject) for name, (_, subject) in SUBJECTS.items()} | {METHOD: _method}
-"""Functions that end their program with an error naming the subject."""
