@@ -85,7 +85,7 @@ def test_a_program_played_by_another_machine_has_no_origin():
     assert [order.origin for order in far.of(Open)] == ["10.0.0.9", None, None]
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(
     st.lists(
         st.one_of(

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tvist_controller.api.line import Setup, body, load_calibration, paper_payload
+from tvist_controller.api.line import Setup, body, paper_payload
 from tvist_controller.api.robot import Controller
 from tvist_lab.metrics import MeasuredRecording, changes, motions
 from tvist_lab.metrics.change_detector import ChangeDetector
@@ -58,13 +58,17 @@ class ChangingArm:
         return Measurement(measured.q, measured.qd, moment, measured.accelerometer)
 
 
-def recorded(mass=0.0, springs=1.0, before=8, after=2):
-    """Random motions of a hidden robot without a shaper, of which the arm is another after the first ones."""
+PICKED_UP, SOFTER, MOTIONS = 8, 10, 14
+"""Numbers of motions before the arm has another payload, before its springs are softer, and in all."""
+
+
+@pytest.fixture(scope="module")
+def recorded():
+    """Random motions of a hidden robot without a shaper, which changes twice between them."""
     random, declared, states = np.random.default_rng([4, 73]), paper_payload(UR5E, 1.7), []
     arm = ChangingArm(body(declared), seed=4)
     setup = Setup(
-        description=UR5E, q=UR5E.poses["Q1"], payload=declared, calibration=load_calibration("ur5e_modal"),
-        shaper="none", clock="free", seed=4,
+        description=UR5E, q=UR5E.poses["Q1"], payload=declared, calibration=None, shaper="none", clock="free", seed=4,
     )  # fmt: skip
     controller = Controller(setup, arm)
     token = controller.receive(TakeControl(client="worker")).token
@@ -73,44 +77,45 @@ def recorded(mass=0.0, springs=1.0, before=8, after=2):
         here = np.array(controller.latest.reference_q)
         away = random.uniform([*WORKSPACE.low, -2.0, -2.0], [*WORKSPACE.high, 2.0, 2.0]) - here
         q = tuple((here + random.uniform(0.3, 1.0) * away).tolist())
-        return controller.receive(MoveJ(token=token, q=q, velocity=1.5, acceleration=2.0, jerk=100.0))
+        return controller.receive(MoveJ(token=token, q=q, velocity=2.5, acceleration=4.0, jerk=200.0))
 
-    for number in range(before + after):
-        if number == before:
-            arm.change(mass, springs)
+    for number in range(MOTIONS):
+        if number == PICKED_UP:
+            arm.change(mass=2.0, springs=1.0)
+        if number == SOFTER:
+            arm.change(mass=2.0, springs=0.6)
         while not isinstance(ask(), Accepted):
             pass
         states.append(controller.tick()[0])
         while not controller.cycle.mode.at_rest:
             states.append(controller.tick()[0])
-        states += [controller.tick()[0] for _ in range(int(random.integers(150, 300)))]
+        states += [controller.tick()[0] for _ in range(int(random.integers(150, 200)))]
     columns = {name: np.array([getattr(state, name) for state in states], dtype=float) for name in COLUMNS}
     recording = Recording(columns, (), SimpleNamespace(model="UR5e", payload=controller.declared))
     found = motions(recording)
-    assert len(found) == before + after
+    assert len(found) == MOTIONS
     return MeasuredRecording(recording, found, [])
 
 
-@pytest.fixture(scope="module")
-def picked_up():
-    return recorded(mass=2.0)
+def changes_until(recorded, number):
+    return changes(MeasuredRecording(recorded.recording, recorded.motions[:number], []))
 
 
-def test_undeclared_payload_is_reported_with_its_mass(picked_up):
-    (mass,) = [one for one in changes(picked_up) if "kg" in one]
+def test_undeclared_payload_is_reported_with_its_mass(recorded):
+    (mass,) = [one for one in changes_until(recorded, SOFTER) if "kg" in one]
     number, more = re.match(r"After motion (\d+), the arm carries about ([\d.]+) kg more", mass).groups()
     assert int(number) in (9, 10)
     assert float(more) == pytest.approx(2.0, abs=0.6)
 
 
-def test_softer_gears_are_reported():
-    said = [one for one in changes(recorded(springs=0.6, after=4)) if "the gear of the " in one]
+def test_softer_gears_are_reported(recorded):
+    said = [one for one in changes_until(recorded, MOTIONS) if "the gear of the " in one]
     assert said
-    assert all(int(re.match(r"After motion (\d+),", one)[1]) > 8 and "% softer" in one for one in said)
+    assert all(int(re.match(r"After motion (\d+),", one)[1]) > SOFTER and "% softer" in one for one in said)
 
 
-def test_unchanged_arm_gives_no_report(picked_up):
-    assert changes(MeasuredRecording(picked_up.recording, picked_up.motions[:8], [])) == []
+def test_unchanged_arm_gives_no_report(recorded):
+    assert changes_until(recorded, PICKED_UP) == []
 
 
 def by_hand(f_d, poses):
@@ -152,10 +157,10 @@ def told(values, errors=0.02):
 @pytest.mark.parametrize("tails", ["normal", "heavy"])
 def test_false_alarms_are_at_most_one_in_a_hundred_motions(tails):
     random, alarms = np.random.default_rng(3), 0
-    for _ in range(40):
+    for _ in range(20):
         noise = 2.0 * random.normal(size=30) if tails == "normal" else random.standard_t(3, size=30)
         alarms += len(told(random.normal() + SCATTER * noise))
-    assert alarms <= 12
+    assert alarms <= 6
 
 
 @pytest.mark.parametrize("shift", [-0.4, 0.4])
@@ -181,9 +186,8 @@ def test_change_back_is_detected():
     assert [round(change.after - change.before, 2) for _, change in told(values)] == [0.5, -0.5]
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_interval_of_a_reported_change_excludes_zero(seed):
-    random, said = np.random.default_rng([seed, 54]), []
+def test_interval_of_a_reported_change_excludes_zero():
+    random, said = np.random.default_rng([0, 54]), []
     for arguments, tell in ((MASS, _of_mass), (GEAR, partial(_of_gear, joint="elbow")), (MODES, _of_modes)):
         for _ in range(25):
             one, count = ChangeDetector(*arguments), int(random.integers(5, 30))

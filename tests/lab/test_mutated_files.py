@@ -410,7 +410,7 @@ def test_malicious_file_does_not_hang_its_reader(tmp_path, measured):
     _try(HOSTILE, 1, tmp_path, measured)
 
 
-@pytest.mark.parametrize("count", [8, pytest.param(400, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("count", [4, pytest.param(400, marks=pytest.mark.nightly)])
 def test_damaged_file_is_read_or_refused(count, tmp_path, measured):
     _try(KINDS, count, tmp_path, measured)
 

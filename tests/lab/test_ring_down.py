@@ -121,7 +121,7 @@ def coloured(random, correlation, shape):
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.9])
-@pytest.mark.parametrize(("count", "least"), [(8, 0.85), pytest.param(200, 0.90, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize(("count", "least"), [(8, 0.85), pytest.param(100, 0.90, marks=pytest.mark.nightly)])
 def test_intervals_contain_the_truth_at_their_confidence(count, least, correlation, measured):
     """Through white noise and that of a filtered sensor, of which few modes are made."""
     fits = []

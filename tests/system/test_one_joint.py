@@ -13,7 +13,7 @@ def test_one_joint_arm_moves_to_a_named_pose_and_replays(called, tmp_path):
         called("move", "0,-3,0,-1.5,0,0", *at).assert_failed(1, "q has 6 values: must be 2")
         assert "moved to" in called("move", "Q3", *at).assert_done().out
         with Wire(served.endpoint) as wire, wire.control() as token:
-            assert len(wire.step(token, 400)["actual_q"]) == 2  # what rings after the motion
+            assert len(wire.step(token, 200)["actual_q"]) == 2  # what rings after the motion
     told = called("log", "analyze", path, "--figures", tmp_path, "--json").assert_done().json
     assert len(told["motions"]) == 1
     assert (tmp_path / "motion_1.png").exists()
