@@ -5,9 +5,9 @@ from functools import cache
 from typing import Any
 
 from tvist_controller.programs.arguments import checked
-from tvist_controller.programs.functions.group import FunctionContext, FunctionGroup
 from tvist_controller.programs.functions.force import ForceFunctions
 from tvist_controller.programs.functions.gripper import GripperFunctions
+from tvist_controller.programs.functions.group import FunctionContext, FunctionGroup
 from tvist_controller.programs.functions.motions import MotionFunctions
 from tvist_controller.programs.functions.program import MessageFunctions, SafetyFunctions, StatementFunctions
 from tvist_controller.programs.functions.settings import SettingFunctions

@@ -6,7 +6,7 @@ from tvist_controller.programs.access import Access
 from tvist_controller.programs.arguments import readable
 from tvist_controller.programs.arm import ProgramArm
 from tvist_controller.programs.compiling import StoredProgram, StoredPrograms, built_in
-from tvist_controller.programs.functions.family import FunctionContext
+from tvist_controller.programs.functions.group import FunctionContext
 from tvist_controller.programs.indicators import MissedTurns, Popups, RunstateOutputs, Watchdogs
 from tvist_controller.programs.interpreter import StatementQueue
 from tvist_controller.programs.kinematics import ProgramKinematics

@@ -8,7 +8,7 @@ from tvist_controller.line.differentiator import Floats
 from tvist_controller.motion.force_control import Feature
 from tvist_controller.programs import arguments as args
 from tvist_controller.programs.blended_moves import Turns
-from tvist_controller.programs.functions.family import FunctionContext, FunctionGroup, reads
+from tvist_controller.programs.functions.group import FunctionContext, FunctionGroup, reads
 from tvist_controller.trajectory import ForceTask
 from tvist_protocol.forces import Push
 from tvist_protocol.io import Length

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from tvist_controller.cell.gripper import CLOSED, MOVING, OPEN, Gripper
 from tvist_controller.programs.arguments import number, whole
 from tvist_controller.programs.blended_moves import Turns
-from tvist_controller.programs.functions.family import FunctionGroup, described
+from tvist_controller.programs.functions.group import FunctionGroup, described
 from tvist_urscript import Fault
 
 _ONE = "1"  # gripper of a call without one; ignored, because the cell has one gripper

@@ -11,7 +11,7 @@ from tvist_controller.programs import arguments as args
 from tvist_controller.programs.access import Access, refusals_as_faults
 from tvist_controller.programs.arm import ProgramArm
 from tvist_controller.programs.blended_moves import Turns
-from tvist_controller.programs.functions.family import FunctionContext, FunctionGroup
+from tvist_controller.programs.functions.group import FunctionContext, FunctionGroup
 from tvist_controller.programs.kinematics import ProgramKinematics
 from tvist_controller.refusal import SLOWEST, check_joints
 from tvist_controller.trajectory import VelocityFollower

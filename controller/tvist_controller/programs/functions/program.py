@@ -5,7 +5,7 @@ from typing import Annotated
 from tvist_controller.programs.access import OWN_TOKEN
 from tvist_controller.programs.arguments import Flag, Text, above_zero, readable, shown, whole, within, word
 from tvist_controller.programs.blended_moves import Turns
-from tvist_controller.programs.functions.family import FunctionGroup
+from tvist_controller.programs.functions.group import FunctionGroup
 from tvist_plant.plant import PERIOD
 from tvist_protocol.commands import PowerOff
 from tvist_protocol.stream import PopupKind

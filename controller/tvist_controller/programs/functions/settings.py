@@ -7,7 +7,7 @@ from tvist_controller.planning.plan import Plan
 from tvist_controller.programs.access import OWN_TOKEN, refusals_as_faults
 from tvist_controller.programs.arguments import Vector3, pose, several, within
 from tvist_controller.programs.blended_moves import DELAY, Turns
-from tvist_controller.programs.functions.family import FunctionGroup, reads
+from tvist_controller.programs.functions.group import FunctionGroup, reads
 from tvist_plant.plant import PERIOD
 from tvist_plant.robot_checks import lacking_inertia
 from tvist_plant.robot_tables import Tensor

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Annotated, Any
 
 from tvist_controller.programs import arguments as args
-from tvist_controller.programs.functions.family import FunctionContext, FunctionGroup, described, reads
+from tvist_controller.programs.functions.group import FunctionContext, FunctionGroup, described, reads
 from tvist_controller.programs.functions.terminals import BitPlace, Configurable, Standard, Tool
 from tvist_controller.programs.indicators import SHOWS_UNTIL_FAILURE, Group
 from tvist_urscript import Array, Fault

@@ -7,7 +7,7 @@ from struct import pack, unpack_from
 from typing import Annotated, Any, TypeVar
 
 from tvist_controller.programs.arguments import Flag, Number, Text, a_list, text, whole
-from tvist_controller.programs.functions.family import FunctionGroup
+from tvist_controller.programs.functions.group import FunctionGroup
 from tvist_controller.programs.sockets import Take
 from tvist_urscript import Value, costs, to_str
 from tvist_urscript.texts import DECIMAL

@@ -12,7 +12,7 @@ from tvist_controller.kinematics.arm import InverseDynamics
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.programs import arguments
 from tvist_controller.programs.arguments import Joints, Target, Text, a_list, a_pose, integer, numbers
-from tvist_controller.programs.functions.family import FunctionContext, FunctionGroup, reads
+from tvist_controller.programs.functions.group import FunctionContext, FunctionGroup, reads
 from tvist_controller.programs.functions.settings import ToolPose
 from tvist_controller.refusal import RefusalError, check_joints
 from tvist_plant.plant import PERIOD

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from tvist_controller.instruments.peripherals import MAX_INTEGER, MIN_INTEGER
 from tvist_controller.programs.arguments import Bit, Flag, Number, Share, either, integer, shown, whole
-from tvist_controller.programs.functions.family import FunctionContext, FunctionGroup, described
+from tvist_controller.programs.functions.group import FunctionContext, FunctionGroup, described
 from tvist_protocol.io import BITS, NUMBERS, Bank
 from tvist_urscript import Array, Fault, costs
 
