@@ -1,12 +1,14 @@
 """Programs saved by PolyScope: the URScript of each kind of node, and refused nodes."""
 
+import gzip
+from time import process_time
+
 import numpy as np
 import pytest
+from tests.controller.scripts import a_robot, run, said
 from tests.server.polyscope_files import contributed, expression, move, saved, waypoint
 
 from tvist_controller.programs.compiling import check_program
-from tvist_lab.in_process import free_setup
-from tvist_lab.programs.running import run_in_lockstep
 from tvist_plant.user_file import UserFileError, xml
 from tvist_server.polyscope.contributed import EXTERNAL_CONTROL
 from tvist_server.polyscope.files import read_program, text_of
@@ -263,34 +265,26 @@ QUESTION = (
 
 
 @pytest.mark.parametrize(
-    ("kind", "answer", "value"),
-    [("Boolean", "true", "True"), ("Integer", "-3", "-3"), ("Float", "2", "2.0"), ("String", 'a "b"', "\"a 'b'\"")],
-)  # fmt: skip
-def test_an_answer_goes_to_the_variable_of_its_question(lines, kind, answer, value):
-    assert lines(QUESTION.format(kind), answers={"x": answer})[1:] == [
-        "$ 2 \"x≔'How?'\"",
-        f"global x={value}",
-    ]
-    with pytest.raises(UserFileError, match=f"--answer x={kind.upper()}"):
-        lines(QUESTION.format(kind), answers={"y": answer})
+    ("kind", "answer", "value", "wrong"),
+    [("Boolean", "true", "True", "perhaps"), ("Integer", "-3", "-3", "2.5"), ("Float", "2", "2.0", "wide")],
+)
+def test_an_answer_goes_to_the_variable_of_its_question(lines, kind, answer, value, wrong):
+    question = QUESTION.format(kind)
+    assert lines(question, answers={"x": answer})[1:] == ["$ 2 \"x≔'How?'\"", f"global x={value}"]
+    for answers in ({"y": answer}, {"x": wrong}):
+        with pytest.raises(UserFileError, match=f"--answer x={kind.upper()}"):
+            lines(question, answers=answers)
 
 
-@pytest.mark.parametrize(("kind", "answer"), [("Boolean", "perhaps"), ("Integer", "2.5"), ("Float", "wide")])
-def test_an_answer_of_another_type_is_refused(lines, kind, answer):
-    with pytest.raises(UserFileError, match=f"--answer x={kind.upper()}"):
-        lines(QUESTION.format(kind), answers={"x": answer})
-
-
-def test_a_timer_counts_the_time_between_start_and_stop(tmp_path):
+def test_a_timer_counts_the_time_between_start_and_stop(lines):
     actions = ("Start", "Stop", "Reset", "Start")
     timers = (f"<Timer action='{action}'><variable name='t'/></Timer>" for action in actions)
     wait = "<Wait type='Sleep'><waitTime>{}</waitTime></Wait>"
-    said = f"<Script type='Line'>{expression('textmsg(t)')}</Script>"
+    says = f"<Script type='Line'>{expression('textmsg(t)')}</Script>"
     start, stop, reset, again = timers
-    nodes = (start, wait.format(0.5), stop, wait.format(0.2), said, reset, again, wait.format(0.1), said)
-    text = text_of(tmp_path / "p.urp", saved(*nodes).encode())
-    run = run_in_lockstep(free_setup(), text, (), attend=lambda _: None, on_record_error=print)
-    assert [float(one.text) for one in run.said] == pytest.approx([0.5, 0.1], abs=0.005)
+    nodes = (start, wait.format(0.5), stop, wait.format(0.2), says, reset, again, wait.format(0.1), says)
+    times = said(run(a_robot(), *lines(*nodes)))
+    assert list(map(float, times)) == pytest.approx([0.5, 0.1], abs=0.005)
 
 
 @pytest.mark.parametrize(
@@ -356,3 +350,27 @@ def test_references_are_followed_up_to_a_limit(hops, place, found):
     root = xml(f"<root>{chain}<h><v name='a'/></h></root>".encode())
     target = References(root).target(root.find("./h/v"))
     assert (target is not None and target.get("name") == "a") is found
+
+
+FOLDERS = "<Folder><children>" * 10_000 + "</children></Folder>" * 10_000
+LOOP = "".join(f"<Call><subprogram reference='../../Call[{k}]/subprogram'/></Call>" for k in (2, 1))
+
+
+@pytest.mark.parametrize(
+    ("content", "why"),
+    [
+        (gzip.compress(b"<a>" + b" " * (100 << 20), 1), "more than 4 MiB when it is unpacked"),
+        (b"<!DOCTYPE a [<!ENTITY b 'b'><!ENTITY c '&b;&b;'>]><a>&c;</a>", "has a document type"),
+        (gzip.compress(saved(FOLDERS).encode()), "nested too deeply"),
+        (saved("<Halt/>" * 400_000).encode(), "has too many elements"),
+        (gzip.compress(saved(LOOP.replace("Call", "CallSubProgram") * 10_000).encode()), "not in the file"),
+        (b"<" * (5 << 20), "more than 4 MiB"),
+    ],
+    ids=["gzip bomb", "entity bomb", "nested levels", "elements", "loop of references", "long file"],
+)
+def test_a_hostile_program_gives_one_error_in_short_time(tmp_path, content, why):
+    (tmp_path / "p.urp").write_bytes(content)
+    begun = process_time()
+    with pytest.raises(UserFileError, match=why):
+        read_program(tmp_path / "p.urp")
+    assert process_time() - begun < 2.0
