@@ -227,14 +227,19 @@ def test_sub_programs_threads_and_initial_values_precede_the_program(lines):
 INSTALLATION = """<Installation>
 <IOs><DigitalOutputNames value="lamp, , "/><ModbusSignal name="Plc 1" type="DIGITAL_INPUT"/></IOs>
 <SafeHomeSettings enabled="true" position="0, 1, 0, 1, 0, 1"/>
-<TCPSettings activePose="hook" toolPayload="1.5" centerOfGravity="0, 0, 0.05"><availablePoses>
-  <tcp name="hook" offset="0, 0, 0.2, 0, 0, 0"/></availablePoses></TCPSettings>
+<TCPSettings activePose="hook" {}><availablePoses>
+  <tcp name="hook" offset="0, 0, 0.2, 0, 0, 0"/></availablePoses></TCPSettings>{}
 <Features><GeomPoseNode name="table" isVariable="true"><toolPosition value="0.3, 0.4, 0"/>
   <toolAxisAngle value="0, 0, 1"/></GeomPoseNode></Features>
 </Installation>"""
 
 
-def test_the_installation_gives_tcp_payload_signals_features_and_variables(tmp_path):
+CARRIED = 'centerOfGravity="0, 0, 0.05"'
+PAYLOAD = f'<PayloadSettings><Payload mass="1.5" defaultPayload="true" {CARRIED}/></PayloadSettings>'
+
+
+@pytest.mark.parametrize("payload", [(f'toolPayload="1.5" {CARRIED}', ""), ("", PAYLOAD)])
+def test_the_installation_gives_tcp_payload_signals_features_and_variables(tmp_path, payload):
     lamp = "<Set type='DigitalOutput'><pin referencedName='lamp'/><digitalValue>1</digitalValue></Set>"
     own = move(waypoint("A", Q), useActiveTCP="false", inside="<tcp referencedName='hook'/>")
     home = "<SafeHome positionOptionType='SPEED_AND_ACCELERATION' speed='1' acceleration='2'/>"
@@ -242,7 +247,7 @@ def test_the_installation_gives_tcp_payload_signals_features_and_variables(tmp_p
     signal = "<ExpressionIO><pin referencedName='Plc 1'/></ExpressionIO>"
     ready = f"<Wait type='Condition'>{expression(signal)}</Wait>"
     (tmp_path / "p.urp").write_text(saved(lamp, own, home, tcp, ready))
-    (tmp_path / "cell.installation").write_text(INSTALLATION)
+    (tmp_path / "cell.installation").write_text(INSTALLATION.format(*payload))
     (tmp_path / "cell.variables").write_text("#\ncount=3\n")
     text = read_program(tmp_path / "p.urp")
     expected = (
@@ -259,9 +264,7 @@ def test_the_installation_gives_tcp_payload_signals_features_and_variables(tmp_p
         read_program(tmp_path / "p.urp")
 
 
-QUESTION = (
-    "<Assignment valueSource='Operator' message='How?' valueType='{}'><variable name='x'/></Assignment>"
-)
+QUESTION = "<Assignment valueSource='Operator' message='?' valueType='{}'><variable name='x'/></Assignment>"
 
 
 @pytest.mark.parametrize(
@@ -270,7 +273,7 @@ QUESTION = (
 )
 def test_an_answer_goes_to_the_variable_of_its_question(lines, kind, answer, value, wrong):
     question = QUESTION.format(kind)
-    assert lines(question, answers={"x": answer})[1:] == ["$ 2 \"x≔'How?'\"", f"global x={value}"]
+    assert lines(question, answers={"x": answer})[1:] == ["$ 2 \"x≔'?'\"", f"global x={value}"]
     for answers in ({"y": answer}, {"x": wrong}):
         with pytest.raises(UserFileError, match=f"--answer x={kind.upper()}"):
             lines(question, answers=answers)

@@ -47,8 +47,9 @@ class Installation:
         }
         settings = tree.find("TCPSettings")
         active = None if settings is None else tcps.get(settings.get("activePose") or "")
-        if active is not None and settings is not None and settings.get("toolPayload") is not None:
-            active = Tcp(active.offset, *_payload(settings))
+        for one in (settings, tree.find("./PayloadSettings/Payload[@defaultPayload='true']")):
+            if active is not None and one is not None and _payload(one)[0] is not None:
+                active = Tcp(active.offset, *_payload(one))
         pins = {
             name.strip(): f"{kind}[{number}]"
             for list_of, kind in _SIGNALS.items()
@@ -106,5 +107,5 @@ def pose(values: Pose) -> str:
 
 
 def _payload(element: Element) -> tuple[float | None, Pose]:
-    mass, cog = element.get("toolPayload"), element.get("centerOfGravity")
+    mass, cog = element.get("toolPayload") or element.get("mass"), element.get("centerOfGravity")
     return (None if mass is None else numbers(mass, 1)[0]), (numbers(cog, 3) if cog else (0.0, 0.0, 0.0))
