@@ -29,7 +29,7 @@ MOVING, EQUAL = 1e-9, 1e-6
 """Change per tick above which a joint moves, and largest difference of equal paths [rad]."""
 _NODE = re.compile(r"^ *# (begin|end): URCap (Installation|Program) Node")
 _VARIABLE = re.compile(r"^  global \w+ ?= ?(p?\[|-?[\d.]+$)")
-_SET_UP = re.compile(r"^  set_(tcp|payload|gravity)\(.*\n", re.MULTILINE)
+_SET_UP = re.compile(r"^  set_\w+\(.*\n", re.MULTILINE)
 _MODBUS = re.compile(r" *modbus_(add|set)_")
 _FIRST = re.compile(
     r"^ *\$ [12] ", re.MULTILINE
