@@ -23,6 +23,7 @@ from tvist_plant.user_file import LARGEST, UserFileError
 from tvist_protocol.errors import harmless
 from tvist_server.config import ServeConfig
 from tvist_server.polyscope.files import read_program
+from tvist_server.polyscope.nodes import NONE, Choices
 from tvist_server.program_folder import SCRIPT, URP
 from tvist_server.server import Server
 from tvist_server.shutdown import Shutdown
@@ -40,8 +41,8 @@ def _is_stdin(file: Path) -> bool:
     return str(file).strip() == "-"  # `readable` may have put a blank before it
 
 
-def read_script(file: Path, skip: Sequence[str] = ()) -> str:
-    """Read a program, without the nodes of some URCaps; `-` reads the standard input."""
+def read_script(file: Path, choices: Choices = NONE) -> str:
+    """Read a program; `-` reads the standard input."""
     if _is_stdin(file):
         content = sys.stdin.buffer.read(LARGEST + 1)
         if len(content) > LARGEST:
@@ -54,7 +55,7 @@ def read_script(file: Path, skip: Sequence[str] = ()) -> str:
             ) from error
     with failing_on(OSError, exit_code=2):
         try:
-            return read_program(file, frozenset(skip))
+            return read_program(file, choices)
         except UserFileError as error:
             raise Misuse(str(error)) from error
 
@@ -71,12 +72,12 @@ def programs_in(files: Sequence[Path]) -> list[Path]:
     return found
 
 
-def read_scripts(files: Sequence[Path], skip: Sequence[str]) -> list[str | Failure]:
+def read_scripts(files: Sequence[Path], choices: Choices) -> list[str | Failure]:
     """Read programs. If there are several, return the Failure of each unreadable one, so others can run."""
     found: list[str | Failure] = []
     for file in files:
         try:
-            found.append(read_script(file, skip))
+            found.append(read_script(file, choices))
         except Failure as error:
             if len(files) == 1:
                 raise
@@ -84,10 +85,10 @@ def read_scripts(files: Sequence[Path], skip: Sequence[str]) -> list[str | Failu
     return found
 
 
-def print_scripts(files: Sequence[Path], skip: Sequence[str]) -> None:
+def print_scripts(files: Sequence[Path], choices: Choices) -> None:
     """Print programs as URScript."""
     for file in programs_in(files):
-        print(read_script(file, skip), end="")
+        print(read_script(file, choices), end="")
 
 
 def placed(file: Path, finding: ProgramFinding) -> str:
@@ -96,10 +97,10 @@ def placed(file: Path, finding: ProgramFinding) -> str:
     return f"{named(file)}:{finding.line}:{finding.column}: {kind}{finding.text}"
 
 
-def check_scripts(files: Sequence[Path], skip: Sequence[str], *, json: bool) -> None:
+def check_scripts(files: Sequence[Path], choices: Choices, *, json: bool) -> None:
     """Print the errors and warnings of programs; raise Failure if there are errors."""
     files = programs_in(files)
-    texts = zip(files, read_scripts(files, skip), strict=True)
+    texts = zip(files, read_scripts(files, choices), strict=True)
     found = [(one, finding) for one, text in texts for finding in _findings(text)]
     errors = sum(finding.level == "error" for _, finding in found)
     if json:

@@ -15,13 +15,14 @@ from tvist_lab.programs.limits import RunLimits
 from tvist_lab.programs.results import junit as junit_of
 from tvist_lab.whole_file import write_whole
 from tvist_server.config import ServeConfig
+from tvist_server.polyscope.nodes import Choices
 
 
 def run_programs(
     file: Sequence[Path],
     given: dict[str, Any],
     *,
-    skip: Sequence[str],
+    choices: Choices,
     lockstep: bool,
     inputs: Sequence[str],
     timeout: float | None,
@@ -39,7 +40,7 @@ def run_programs(
     before = None if baseline is None else _baseline(baseline, file, lockstep=lockstep)
     with failing_on(ValueError, exit_code=2):
         limits.check()
-    texts = read_scripts(file, skip)
+    texts = read_scripts(file, choices)
     checked = _configuration(given, config, lockstep=lockstep)
     if checked.record is not None and len(file) > 1:
         raise Misuse(

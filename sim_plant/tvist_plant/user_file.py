@@ -12,6 +12,7 @@ LARGEST = 4 << 20  # largest file size, a hundred times the largest useful one [
 DEEPEST = 100
 """Deepest nesting of XML elements and TOML brackets, and most parts of a dotted TOML key, since the parser
 takes quadratic time. TOML files need five levels."""
+MOST_ELEMENTS = 50_000  # largest number of XML elements, six times that of the largest useful file
 LONGEST_NAME = 100  # largest number of characters of a name
 LONGEST_LINE = 500  # largest number of characters quoted from a file or a library's message
 
@@ -90,12 +91,14 @@ def xml(data: bytes) -> Element:
 
 
 class _Tree(TreeBuilder):
-    """Builder of XML elements that limits the depth."""
+    """Builder of XML elements that limits their depth and number."""
 
-    depth = 0
+    depth = count = 0
 
     def start(self, tag: str, attrs: dict[str, str]) -> Element:
-        self.depth += 1
+        self.depth, self.count = self.depth + 1, self.count + 1
+        if self.count > MOST_ELEMENTS:
+            raise UserFileError(f"it has too many elements: at most {MOST_ELEMENTS} are supported")
         if self.depth > DEEPEST:
             raise UserFileError(f"it is nested too deeply: at most {DEEPEST} levels are supported")
         return super().start(tag, attrs)

@@ -23,6 +23,7 @@ def run(
     check: bool = False,
     translate: bool = False,
     skip: list[str] | None = None,
+    answer: list[str] | None = None,
     lockstep: bool = False,
     inputs: Annotated[list[str] | None, Parameter(name="--input")] = None,
     timeout: float | None = None,
@@ -56,6 +57,7 @@ def run(
         translate: Print the program as URScript instead of running it.
         skip: Leave out the nodes of this URCap in .urp files, repeatable: a name such as Robotiq_Copilot, or one of its
             nodes such as 'Robotiq_Copilot: Force Control'.
+        answer: Answer a question of a .urp file with NAME=VALUE, repeatable. NAME is the variable that gets the answer.
         lockstep: Run as fast as this machine computes, without network; the arm moves exactly as in real
             time. A program that waits for a client then waits for ever: see --input and --timeout. It can
             open sockets only to the gripper of a cell.
@@ -73,19 +75,22 @@ def run(
     """
     from tvist_cli.program_runs import check_scripts, print_scripts
     from tvist_cli.running import run_programs
+    from tvist_server.polyscope.nodes import Choices
 
+    answers = {name: value for name, _, value in (one.partition("=") for one in answer or ())}
+    choices = Choices(frozenset(skip or ()), answers)
     runs = any((given, lockstep, inputs, config, timeout is not None, limits != NO_LIMITS, junit, baseline))
     if translate:
         if runs or check or json:
-            raise Misuse("--translate runs nothing, so that only --skip goes with it: leave the others out")
-        print_scripts(file, skip or ())
+            raise Misuse("--translate runs nothing: leave out all options but --skip and --answer")
+        print_scripts(file, choices)
         return
     if check:
         if runs:
             raise Misuse("--check runs nothing, so that only --json goes with it: leave the others out")
-        check_scripts(file, skip or (), json=json)
+        check_scripts(file, choices, json=json)
         return
     run_programs(
-        file, given, skip=skip or (), lockstep=lockstep, inputs=inputs or (), timeout=timeout, limits=limits,
+        file, given, choices=choices, lockstep=lockstep, inputs=inputs or (), timeout=timeout, limits=limits,
         junit=junit, baseline=baseline, config=config, json=json,
     )  # fmt: skip

@@ -2,6 +2,7 @@
 
 from xml.etree.ElementTree import Element
 
+from tvist_server.polyscope.expressions import quoted
 from tvist_server.polyscope.installation import numbers
 
 _GRIPPER = "com.robotiq.urcap.gripper."
@@ -16,6 +17,8 @@ _LINES = {
     f"{_GRIPPER}GripperActivate": ["rq_activate_and_wait()"],
     f"{_FORCE}Zero FT Sensor": ["zero_ftsensor()", "sleep(0.1)"],
 }
+_FORCED = ("x", "y", "z", "mx", "my", "mz")  # directions of Robotiq's Force Control
+_LIMITS = [0.1, 0.1, 0.1, 0.35, 0.35, 0.35]  # speeds or deviations that it allows here [m/s, rad/s, m, rad]
 _BRANCHES = {
     f"{_GRIPPER}gripper_validation_{part}node": head
     for part, head in (("", ""), ("if_", "if"), ("else_", "else"))
@@ -31,7 +34,19 @@ def kind_of(node: Element) -> str:
 def lines_of(node: Element) -> list[str] | None:
     """Return a node's lines of URScript without its children's; None if the node cannot be translated."""
     kind = node.get("strategyClass") or ""
+    if kind == "com.olisrobotics.teleop.TeleopNode":
+        shown = quoted(_datum(node, "OperatorMessage", ""))
+        return ["freedrive_mode()", f'popup({shown}, "Teleop", blocking=True)', "end_freedrive_mode()"]
     return _move_fingers(node) if kind == f"{_GRIPPER}GripperNode" else _LINES.get(kind)
+
+
+def force_task(node: Element) -> str | None:
+    """Return the call that begins Robotiq's Force Control, whose stiffness is unknown; None for other nodes."""
+    if node.get("strategyClass") != f"{_FORCE}ForceNode":
+        return None
+    chosen = [int(_datum(node, f"ft_control_{way}", "") == "true") for way in _FORCED]
+    wrench = [numbers(_datum(node, f"force_{way}", "0"), 1)[0] for way in _FORCED]
+    return f"force_mode(tool_pose(), {chosen}, {wrench}, 2, {_LIMITS})"
 
 
 def branch_of(node: Element) -> str | None:

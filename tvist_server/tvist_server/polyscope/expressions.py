@@ -9,7 +9,7 @@ from tvist_server.polyscope.references import References
 
 _SIGNS = {"≟": " == ", "≠": " != ", "≤": " <= ", "≥": " >= ", "×": "*", "÷": "/"}
 _NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
-_PIN = re.compile(r"(\w+)\[(\d{1,3})\]")
+_PIN = re.compile(r'(\w+)\[(\d{1,3}|"[\w .-]+")\]')
 _NAMES = ("name", "featureName", "referencedName")  # attributes that name a variable or feature
 _READ = {
     "digital_in": "get_standard_digital_in", "digital_out": "get_standard_digital_out",
@@ -20,6 +20,7 @@ _READ = {
     "gp_bool_in": "read_input_boolean_register", "gp_bool_out": "read_output_boolean_register",
     "gp_int_in": "read_input_integer_register", "gp_int_out": "read_output_integer_register",
     "gp_float_in": "read_input_float_register", "gp_float_out": "read_output_float_register",
+    "modbus": "modbus_get_signal_status",
 }  # fmt: skip
 _WRITE = {
     "digital_out": "set_standard_digital_out", "config_out": "set_configurable_digital_out",
@@ -37,6 +38,11 @@ def script_name(text: str) -> str:
     """Return a name as PolyScope writes it in scripts: non-ASCII letters become `u` and their code points."""
     plain = "".join(c if re.match(r"\w", c, re.ASCII) else f"u{ord(c)}" if c.isalpha() else "_" for c in text)
     return plain if plain[:1].isalpha() or plain[:1] == "_" else f"_{plain}"
+
+
+def quoted(text: str) -> str:
+    """Return a text as URScript, in one line."""
+    return f'"{" ".join(text.replace(chr(34), chr(39)).split())}"'
 
 
 class Expressions:
@@ -84,19 +90,20 @@ class Expressions:
             raise UnknownPartError("a variable without a name")
         return script_name(name)
 
-    def output(self, node: Element | None) -> tuple[str, int, str]:
+    def output(self, node: Element | None) -> tuple[str, str, str]:
         """Return the function that sets an output, its number, and its name."""
-        return self._pin(node, _WRITE)
+        function, number, name = self._pin(node, _WRITE)
+        return function, number, self._installation.shown(name)
 
     def input(self, node: Element | None) -> str:
         """Return the call that reads a signal."""
         function, number, _ = self._pin(node, _READ)
         return f"{function}({number})"
 
-    def _pin(self, node: Element | None, functions: dict[str, str]) -> tuple[str, int, str]:
+    def _pin(self, node: Element | None, functions: dict[str, str]) -> tuple[str, str, str]:
         target = self._references.target(node)
         name = "" if target is None else target.get("referencedName") or ""
         words = _PIN.fullmatch(self._installation.pin(name))
         if words is None or words[1] not in functions:
             raise UnknownPartError(f"the signal {name or 'without a name'}")
-        return functions[words[1]], int(words[2]), self._installation.shown(words[0])
+        return functions[words[1]], words[2], name

@@ -6,31 +6,26 @@ from pathlib import Path
 
 from tvist_plant.user_file import LARGEST, UserFileError, read_bytes, xml
 from tvist_server.polyscope.installation import Installation
+from tvist_server.polyscope.nodes import NONE, Choices
 from tvist_server.polyscope.script import script_of
 
 _GZIP, _XML = b"\x1f\x8b", b"<"
 
 
-def read_program(path: Path, skip: frozenset[str] = frozenset()) -> str:
+def read_program(path: Path, choices: Choices = NONE) -> str:
     """Return the text of a program, translated if PolyScope saved it.
 
-    Args:
-        path: The file.
-        skip: Names of URCaps, or `URCap: node`, whose nodes are left out.
-
-    Raises:
-        UserFileError: It is no program, or has nodes that cannot be translated.
-        OSError: It cannot be read.
+    Raises UserFileError if it is no program or has nodes that cannot be translated, OSError if it cannot be read.
     """
-    return text_of(path, read_bytes(path, "program"), skip)
+    return text_of(path, read_bytes(path, "program"), choices)
 
 
-def text_of(path: Path, data: bytes, skip: frozenset[str] = frozenset()) -> str:
+def text_of(path: Path, data: bytes, choices: Choices = NONE) -> str:
     """Return the text of a program from the content of its file; see `read_program`."""
     data = unpacked(f"program {path}", data)
     try:
         if data.lstrip().startswith(_XML):
-            return script_of(path.stem, xml(data), lambda name: _installation(path, name), skip)
+            return script_of(path.stem, xml(data), lambda name: _installation(path, name), choices)
         return data.decode("utf-8-sig")
     except UserFileError as error:
         raise UserFileError(f"program {path}: {error}") from error

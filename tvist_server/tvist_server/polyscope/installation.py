@@ -12,6 +12,7 @@ _SIGNALS = {
     "GeneralPurposeIntRegisterInputNames": "gp_int_in", "GeneralPurposeIntRegisterOutputNames": "gp_int_out",
     "GeneralPurposeFloatRegisterInputNames": "gp_float_in", "GeneralPurposeFloatRegisterOutputNames": "gp_float_out",
 }  # fmt: skip
+_SHORT = {"digital_out": "DO", "config_out": "CO", "tool_out": "TO"}  # in labels
 _LARGEST = 1e6  # largest magnitude of a number that is accepted
 
 Pose = tuple[float, ...]
@@ -35,6 +36,7 @@ class Installation:
     pins: dict[str, str] = field(default_factory=dict)  # signals such as `digital_in[0]` by their names
     features: dict[str, Pose] = field(default_factory=dict)  # poses of features in the base frame
     variables: dict[str, str] = field(default_factory=dict)  # initial values as URScript
+    home: Pose | None = None  # joint angles of the safe home position [rad]
 
     @classmethod
     def of(cls, tree: Element, variables: str = "") -> Self:
@@ -45,8 +47,9 @@ class Installation:
         }
         settings = tree.find("TCPSettings")
         active = None if settings is None else tcps.get(settings.get("activePose") or "")
-        if active is not None and settings is not None and settings.get("toolPayload") is not None:
-            active = Tcp(active.offset, *_payload(settings))
+        for one in (settings, tree.find("./PayloadSettings/Payload[@defaultPayload='true']")):
+            if active is not None and one is not None and _payload(one)[0] is not None:
+                active = Tcp(active.offset, *_payload(one))
         pins = {
             name.strip(): f"{kind}[{number}]"
             for list_of, kind in _SIGNALS.items()
@@ -54,6 +57,7 @@ class Installation:
             for number, name in enumerate((names.get("value") or "").split(","))
             if name.strip()
         }
+        pins |= {one.get("name") or "": f'modbus["{one.get("name")}"]' for one in tree.iter("ModbusSignal")}
         features = {
             one.get("name") or "": numbers(place.get("value"), 3) + numbers(turn.get("value"), 3)
             for one in tree.iter("GeomPoseNode")
@@ -63,15 +67,19 @@ class Installation:
         }
         lines = (line.partition("=") for line in variables.splitlines() if not line.startswith("#"))
         values = {name: value for name, equals, value in lines if equals}
-        return cls(tcps, active, pins, features, values)
+        home = tree.find("SafeHomeSettings")
+        at = None if home is None or home.get("enabled") != "true" else numbers(home.get("position"), 6)
+        return cls(tcps, active, pins, features, values, at)
 
     def pin(self, name: str) -> str:
         """Return the signal with a name of the installation, or the name itself."""
         return self.pins.get(name, name)
 
-    def shown(self, pin: str) -> str:
-        """Return how PolyScope names a signal."""
-        return next((name for name, signal in self.pins.items() if signal == pin), pin)
+    def shown(self, output: str) -> str:
+        """Return how PolyScope names an output in labels."""
+        kind, bracket, number = (pin := self.pin(output)).partition("[")
+        plain = f"{_SHORT.get(kind, kind)}{bracket}{number}"
+        return next((name for name, signal in self.pins.items() if signal == pin), plain)
 
     def start(self) -> list[str]:
         """Return the lines of URScript with which PolyScope begins a program."""
@@ -99,5 +107,5 @@ def pose(values: Pose) -> str:
 
 
 def _payload(element: Element) -> tuple[float | None, Pose]:
-    mass, cog = element.get("toolPayload"), element.get("centerOfGravity")
+    mass, cog = element.get("toolPayload") or element.get("mass"), element.get("centerOfGravity")
     return (None if mass is None else numbers(mass, 1)[0]), (numbers(cog, 3) if cog else (0.0, 0.0, 0.0))

@@ -1,5 +1,6 @@
 """Move nodes of PolyScope with their waypoints, circles and directions, as URScript."""
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element
@@ -15,6 +16,8 @@ DIRECTION = "gui.program.direction.MoveDirectionNode"
 _FUNCTIONS = {"MoveJ": "movej", "MoveL": "movel", "MoveP": "movep"}
 _BASE, _TOOL = "p[0.0,0.0,0.0,0.0,0.0,0.0]", "get_forward_kin()"
 _FEATURES = {"Joint_0_name": ("Base", _BASE), "Joint_6_name": ("Tool", _TOOL)}
+_GIVEN = re.compile("blend|acceleration|speed|time")  # what a waypoint may have of its own
+_COMPARED = {"0": "<", "1": ">"}  # comparisons of analog inputs
 _AXES = {
     f"{axis}{name}": (f"{axis}{sign}", [float(f"{sign}1") * (axis == other) + 0.0 for other in "XYZ"])
     for axis in "XYZ"
@@ -46,7 +49,7 @@ class _Style:
     tcp: str  # TCP to set before each motion; empty: the active TCP
     flange: bool  # whether waypoints are poses of the flange
     feature: Element | None
-    ends: bool  # whether the next node is no MoveP, so that the last waypoint has no blend
+    ends: bool  # whether nothing or another kind of Move follows, so that the last waypoint has no blend
 
 
 class Moves:
@@ -77,15 +80,16 @@ class Moves:
         style = _Style(
             kind, speed, acceleration, numbers(node.get("blendRadius") or "0", 1)[0],
             node.get("positionType") == "JointAngles",
-            "" if active or tcp is None else self._tcp(tcp), not active and tcp is None, node.find("feature"),
-            following is None or following.get("motionType") != "MoveP",
+            "" if active or tcp is None else self.tcp(tcp), not active and tcp is None, node.find("feature"),
+            following is None or following.get("motionType") not in {None, "MoveP"},
         )  # fmt: skip
         self._text.label(node, kind)
         self._styles.append(style)
         self._children(node)
         self._styles.pop()
 
-    def _tcp(self, node: Element) -> str:
+    def tcp(self, node: Element) -> str:
+        """Return the call that sets a TCP of the installation."""
         target = self._references.target(node)
         name = "" if target is None else target.get("referencedName") or ""
         if name not in self._installation.tcps:
@@ -104,29 +108,24 @@ class Moves:
         """Translate a Waypoint."""
         style, (place, near) = self._style, self._place(node)
         own = node.find("motionParameters")
-        speed, acceleration, blend, duration = style.speed, style.acceleration, 0.0, ""
+        given = {"acceleration": style.acceleration, "speed": style.speed}
+        if style.kind == "MoveP":
+            given["blend"] = repr(self._blend(node))
+        other = "cartesian" if style.kind == "MoveJ" else "joint"  # values for the other kind of motion
         for name, value in {} if own is None else own.attrib.items():
-            plain = name.lower()
-            if "blend" in plain:
-                blend = numbers(value, 1)[0]
-            elif "acceleration" in plain:
-                acceleration = _number(value)
-            elif "speed" in plain:
-                speed = _number(value)
-            elif "time" in plain or "duration" in plain:
-                duration = f", t={_number(value)}"
-            else:
+            if (found := _GIVEN.search(name.lower())) is None:
                 raise UnknownPartError(f"a waypoint's {name}")
+            if not name.startswith(other):
+                given[found[0]] = _number(value)
         self._text.label(node, self._name(node))
         if style.tcp:
             self._text.line(style.tcp)
         if near and place != near:
             place = f"pose_trans({place}, get_tcp_offset())" if style.flange else place
             place = f"get_inverse_kin({place}, qnear={near})" if style.kind == "MoveJ" else place
-        radius = f", r={blend!r}" if blend else ""
-        if style.kind == "MoveP":
-            radius = f", r={self._blend(node)!r}"
-        self._text.line(f"{_FUNCTIONS[style.kind]}({place}, a={acceleration}, v={speed}{duration}{radius})")
+        timing = f"t={given['time']}" if "time" in given else f"a={given['acceleration']}, v={given['speed']}"
+        radius = f", r={given['blend']}" if "blend" in given else ""
+        self._text.line(f"{_FUNCTIONS[style.kind]}({place}, {timing}{radius})")
 
     def _name(self, node: Element) -> str:
         if node.get("type") == "Variable":
@@ -187,17 +186,19 @@ class Moves:
         if (own := node.get("toolParams")) is not None:
             speed, acceleration = map(repr, numbers(own, 2))
         ends = node.findall("./children/Until")
-        far = next(
-            (_number(end.findtext("Distance")) for end in ends if end.get("type") == "DISTANCE"), repr(_FAR)
-        )
+        ends.sort(key=lambda end: end.get("type") == "DISTANCE")  # PolyScope checks the distance last
+        far, radius = repr(_FAR), ""
+        for end in (one for one in ends if one.get("type") == "DISTANCE"):
+            far, blend = _number(end.findtext("Distance")), end.find("motionParameters")
+            if end.get("distanceNodeType") == "BLEND" and blend is not None:
+                radius = f", r={_number(blend.get('blendRadius'))}"
         self.has_directions = True
         text.label(node, f"Direction: {shown} {axis}".rstrip(), f"global move_state_{number}=0")
         with text.block(f"thread move_{number}():"):
             text.line("enter_critical", f"move_state_{number} = 1")
             text.line(f"local ahead=point_towards({frame}, {direction}, {far})")
-            text.line(
-                f"movel(ahead, a={acceleration}, v={speed})", f"move_state_{number} = 2", "exit_critical"
-            )
+            text.line(f"movel(ahead, a={acceleration}, v={speed}{radius})")
+            text.line(f"move_state_{number} = 2", "exit_critical")
         text.line(f"move_state_{number} = 0", f"move_handle_{number} = run move_{number}()")
         with text.block("while (True):"):
             for end in ends:
@@ -224,21 +225,19 @@ class Moves:
     def _until(self, node: Element, number: int) -> None:
         text, kind = self._text, node.get("type") or ""
         stop = _number(node.get("decelerationAcceleration") or node.get("deceleration") or _BRAKING)
+        halt = f"kill move_handle_{number}\nstopl({'3.0' if kind == 'IO' else stop})"
         match kind:
-            case "DISTANCE" if node.get("distanceNodeType") == "STOP":
+            case "DISTANCE":
                 text.line("sleep(1.0E-10)")
                 condition, halt = f"move_state_{number} > 1", f"join move_handle_{number}"
             case "TOOL_CONTACT_DETECTION":
-                text.line(
-                    "local towards=get_target_tcp_speed()", "local steps_back=tool_contact(direction=towards)"
-                )
-                condition, halt = "steps_back > 0", f"kill move_handle_{number}\nstopl({stop})"
+                text.line("local towards=get_target_tcp_speed()")
+                text.line("local steps_back=tool_contact(direction=towards)")
+                condition = "steps_back > 0"
             case "IO":
                 condition = self.input_is(node)
-                halt = f"kill move_handle_{number}\nstopl(3.0)"
             case "EXPRESSION":
                 condition = self._expressions.text(node)
-                halt = f"kill move_handle_{number}\nstopl({stop})"
             case _:
                 raise UnknownPartError(f"Until ({kind or 'without a type'})")
         with text.block(f"if ({condition}):"):
@@ -261,11 +260,15 @@ class Moves:
         self._text.line(f"movel(touched, a={acceleration}, v=0.1)")
 
     def input_is(self, node: Element) -> str:
-        """Return the condition that a digital input has the value given in a node."""
+        """Return the condition that an input has the value given in a node."""
+        call = self._expressions.input(node.find("pin"))
         wanted = node.get("digitalValue") or node.findtext("digitalValue") or ""
-        if wanted not in {"0", "1", "true", "false"}:
-            raise UnknownPartError("an analog input as a condition")
-        return f"{self._expressions.input(node.find('pin'))} == {wanted in {'1', 'true'}}"
+        if wanted in {"0", "1", "true", "false"}:
+            return f"{call} == {wanted in {'1', 'true'}}"
+        sign = _COMPARED.get(node.findtext("analogComparison") or "")
+        if sign is None:
+            raise UnknownPartError(f"{node.tag} for a signal without a value")
+        return f"{call} {sign} {_number(node.findtext('analogValue'))}"
 
 
 def _number(text: str | None) -> str:

@@ -1,19 +1,37 @@
 """The nodes of a program saved by PolyScope, as URScript."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import NoReturn
 from xml.etree.ElementTree import Element
 
 from tvist_server.polyscope import contributed
-from tvist_server.polyscope.expressions import Expressions, UnknownPartError, script_name
+from tvist_server.polyscope.expressions import Expressions, UnknownPartError, quoted, script_name
 from tvist_server.polyscope.installation import Installation, numbers
 from tvist_server.polyscope.moves import DIRECTION, Moves
 from tvist_server.polyscope.references import References
 from tvist_server.polyscope.script_text import ScriptText
 
 _OTHERS = "2147483647"  # case value of a Switch's default case
+_TIMED = {"Start": "_rate = 1", "Stop": "_rate = 0", "Reset": " = 0"}  # what a Timer does to its variables
+_ANSWERS: dict[str, Callable[[str], str]] = {
+    "Boolean": lambda text: {"true": "True", "false": "False"}[text.lower()], "String": quoted,
+    "Integer": lambda text: str(int(text)), "Float": lambda text: repr(numbers(text, 1)[0]),
+}  # fmt: skip
+_TASK = {"selection", "wrench", "limitsForce", "limitsMotion"}  # what a Force node has
 _POPUPS = {"Message": "False, False", "Warning": "True, False", "Error": "False, True"}
+
+
+@dataclass(frozen=True)
+class Choices:
+    """What a user decides about a translation."""
+
+    skip: frozenset[str] = frozenset()  # URCaps, or `URCap: node`, whose nodes are left out
+    answers: Mapping[str, str] = field(default_factory=dict)  # operator's answers by the variables they go to
+
+
+NONE = Choices()
 
 
 def children_of(node: Element) -> list[Element]:
@@ -39,10 +57,12 @@ class Nodes:
         references: References,
         installation: Installation,
         numbers_of: dict[Element, int],
-        skip: frozenset[str] = frozenset(),
+        choices: Choices = NONE,
     ) -> None:
         self.text, self.missing = ScriptText(numbers_of), list[str]()
-        self._references, self._skip = references, skip
+        self.timers: dict[str, None] = {}  # names of timers
+        self._references, self._choices, self._home = references, choices, installation.home
+        self._flags: dict[Element | None, str] = {}  # flags of Ifs checked continuously, by the next nodes
         self._following: dict[Element | None, Element | None] = {}  # next node of each node
         self.expressions = Expressions(references, installation)
         self._switches, self._grip = 0, ""  # Switch nodes so far; condition of the present Grip Check
@@ -55,14 +75,19 @@ class Nodes:
             "Comment": self._comment, "Script": self._script, "Wait": self._wait,
             "Popup": self._popup, "Assignment": self._assignment, "If": self._if, "Loop": self._loop,
             "Switch": self._switch, "Set": self._set, "Force": self._force, "CallSubProgram": self._call,
-            "Contributed": self._contributed, "Move": moves.move, "Waypoint": moves.waypoint,
-            "CircleMove": moves.circle, DIRECTION: moves.direction,
+            "Timer": self._timer, "SafeHome": self._safe_home, "Contributed": self._contributed,
+            "Move": moves.move, "Waypoint": moves.waypoint, "CircleMove": moves.circle, DIRECTION: moves.direction,
         }  # fmt: skip
 
     def children(self, node: Element) -> None:
         """Translate the nodes inside a node."""
         shown = [one for one in children_of(node) if one.tag != "SuppressedNode"]
-        self._following.update(pairwise([*shown, None]))
+        end = node if node.tag == "Folder" else None  # what follows a folder follows its last node
+        self._following.update(pairwise([*shown, end]))
+        suppressed_too = pairwise([*children_of(node), end])
+        self._following.update(
+            (one, after) for one, after in suppressed_too if one is not None and one.tag == "Move"
+        )
         for one in shown:
             try:
                 self._kinds.get(one.tag, _refuse)(one)
@@ -89,7 +114,7 @@ class Nodes:
 
     def _comment(self, node: Element) -> None:
         words = " ".join((node.get("comment") or "").split())
-        self.text.label(node, f"'{words}'")
+        self.text.label(node, f"'{words}'" if words else "Comment")
 
     def _script(self, node: Element) -> None:
         if node.find("./expression/*") is not None:
@@ -109,7 +134,7 @@ class Nodes:
                 return
             case "Condition":
                 shown, condition = self.expressions.label(node), self.expressions.text(node)
-            case "DigitalInput":
+            case "DigitalInput" | "AnalogInput":
                 shown = condition = self.moves.input_is(node)
             case other:
                 raise UnknownPartError(f"Wait ({other or 'without a type'})")
@@ -120,30 +145,58 @@ class Nodes:
     def _popup(self, node: Element) -> None:
         if (kind := node.get("type") or "") not in _POPUPS:
             _refuse(node)
-        message = " ".join((node.get("message") or "").replace('"', "'").split())
-        call = f'popup("{message}", "{kind}", {_POPUPS[kind]}, blocking=True)'
-        halt = ["halt"] if node.get("haltProgram") == "true" else []
-        self.text.label(node, f"Popup: {message}", call, *halt)
+        message, halt = node.get("message") or "", ["halt"] if node.get("haltProgram") == "true" else []
+        said = quoted(message)
+        if node.get("inputType") == "Variable":
+            said = f'str_cat("", {self.expressions.variable(node.find("variable"))})'
+        call = f'popup({said}, "{kind}", {_POPUPS[kind]}, blocking=True)'
+        self.text.label(node, f"Popup: {message}" if message else "Popup", call, *halt)
 
     def _assignment(self, node: Element) -> None:
         name = self.expressions.variable(node.find("variable"))
         source = node.get("valueSource") or "Expression"
-        if source != "Expression":
+        if source == "Operator":
+            shown, value = f"'{node.get('message')}'", self._answer(name, node.get("valueType") or "")
+        elif source == "Expression":
+            shown, value = self.expressions.label(node), self.expressions.text(node)
+        else:
             raise UnknownPartError(f"Assignment ({source})")
-        shown = f"{name}≔{self.expressions.label(node)}"
-        self.text.label(node, shown, f"global {name}={self.expressions.text(node)}")
+        self.text.label(node, f"{name}≔{shown}", f"global {name}={value}")
+
+    def _answer(self, name: str, kind: str) -> str:
+        """Return the answer of the operator as URScript."""
+        try:
+            return _ANSWERS[kind](self._choices.answers[name])
+        except (KeyError, ValueError):
+            raise UnknownPartError(f"a question: give --answer {name}={kind.upper()}") from None
 
     def _if(self, node: Element) -> None:
-        if node.get("checkContinuously") == "true":
-            raise UnknownPartError("an If that checks its condition continuously")
         kind, condition = node.get("type") or "If", self.expressions.text(node)
-        heads = {"If": f"if ({condition}):", "ElseIf": f"elif ({condition}):", "Else": "else:"}
-        if kind not in heads:
+        following, flag = self._following[node], self._flags.get(node)
+        other = f"if ({flag} == 0):" if flag else "else:"
+        heads = {"If": f"if ({condition}):", "ElseIf": f"elif ({condition}):", "Else": other}
+        if kind not in heads or (flag and kind == "ElseIf"):
             raise UnknownPartError(f"If ({kind})")
-        following = self._following[node]
-        more = following is not None and following.tag == "If" and following.get("type") != "If"
         title = f"{kind} {self.expressions.label(node)}"
+        if kind == "If" and node.get("checkContinuously") == "true":
+            number = self.text.numbers[node]
+            flag = self._flags[following] = f"thread_flag_{number}"  # whether the thread has ended by itself
+            self.text.label(node, title, f"global {flag}=0")
+            with self.text.block(f"thread Thread_if_{number}():"):
+                self.children(node)
+                self.text.line(f"{flag} = 1")
+            self._run_while(f"if_{number}", condition, f"{flag} == 0 and ({condition})")
+            return
+        more = following is not None and following.tag == "If" and following.get("type") != "If"
         self._branch(node, heads[kind], title if kind == "If" else title.rstrip(), more=more)
+
+    def _run_while(self, name: str, starts: str, lasts: str) -> None:
+        handler = f"thread_handler_{name.rpartition('_')[2]}"
+        with self.text.block(f"if ({starts}):"):
+            self.text.line(f"global {handler}=run Thread_{name}()")
+            with self.text.block(f"while ({lasts}):"):
+                self.text.line("sync()")
+            self.text.line(f"kill {handler}")
 
     def _loop(self, node: Element) -> None:
         match node.get("type"):
@@ -173,11 +226,7 @@ class Nodes:
         with self.text.block(f"thread Thread_while_{number}():"), self.text.block("while (True):"):
             self.children(node)
             self.text.line("sync()")
-        with self.text.block(f"if ({condition}):"):
-            self.text.line(f"global thread_handler_{number}=run Thread_while_{number}()")
-            with self.text.block(f"while ({condition}):"):
-                self.text.line("sync()")
-            self.text.line(f"kill thread_handler_{number}")
+        self._run_while(f"while_{number}", condition, condition)
 
     def _switch(self, node: Element) -> None:
         self._switches += 1
@@ -203,43 +252,59 @@ class Nodes:
     # ------------------------------------------------------------------ robot
 
     def _set(self, node: Element) -> None:
-        match node.get("type"):
-            case "NoAction":
-                self.text.label(node, "Set")
-            case "DigitalOutput":
-                function, number, shown = self.expressions.output(node.find("pin"))
-                on = node.findtext("digitalValue") in {"1", "true"}
-                title = f"Set {shown}={'On' if on else 'Off'}"
-                self.text.label(node, title, f"{function}({number}, {on})")
-            case other:
-                raise UnknownPartError(f"Set ({other or 'without a type'})")
+        kind, tcp, title, lines = node.get("type"), node.find("tcp"), "Set", list[str]()
+        if kind in {"DigitalOutput", "ExpressionOutput"}:
+            function, number, name = self.expressions.output(node.find("pin"))
+            on = node.findtext("digitalValue") in {"1", "true"}
+            value, shown = str(on), "On" if on else "Off"
+            if kind == "ExpressionOutput":
+                value, shown = self.expressions.text(node), self.expressions.label(node)
+            title, lines = f"Set {name}={shown}", [f"{function}({number}, {value})"]
+        elif kind != "NoAction":
+            raise UnknownPartError(f"Set ({kind or 'without a type'})")
+        self.text.label(node, title, *lines, *([] if tcp is None else [self.moves.tcp(tcp)]))
+
+    def _timer(self, node: Element) -> None:
+        name, action = self.expressions.variable(node.find("variable")), node.get("action") or ""
+        if action not in _TIMED:
+            raise UnknownPartError(f"Timer ({action or 'without an action'})")
+        self.timers[name] = None
+        self.text.label(node, f"{name}: {action}", name + _TIMED[action])
+
+    def _safe_home(self, node: Element) -> None:
+        if self._home is None or node.get("positionOptionType") != "SPEED_AND_ACCELERATION":
+            raise UnknownPartError("SafeHome (without a position or speed)")
+        speed, acceleration = (numbers(node.get(name), 1)[0] for name in ("speed", "acceleration"))
+        self.text.label(node, "Home", f"movej({list(self._home)}, a={acceleration}, v={speed})")
 
     def _force(self, node: Element) -> None:
-        if node.get("type") != "Frame":
+        if all(one.tag == "Placeholder" for one in children_of(node)):
+            return
+        parts = {part.tag: numbers(part.get("value"), 6) for part in node if part.get("value")}
+        if node.get("type") not in {"Frame", "Simple"} or not parts.keys() >= _TASK:
             _refuse(node)
         name, frame = self.moves.feature(node.find("feature"))
-        parts = {
-            tag: numbers(_value(node, tag), 6)
-            for tag in ("selection", "wrench", "limitsForce", "limitsMotion")
-        }
         chosen = [int(axis) for axis in parts["selection"]]
-        limits = [
-            force if axis else motion
-            for axis, force, motion in zip(chosen, parts["limitsForce"], parts["limitsMotion"], strict=True)
-        ]
+        by_axis = ("limitsForce" if axis else "limitsMotion" for axis in chosen)
+        limits = [parts[name][axis] for axis, name in enumerate(by_axis)]
         frame = "tool_pose()" if name == "Tool" else frame
         call = f"force_mode({frame}, {chosen}, {list(parts['wrench'])}, 2, {limits})"
-        self.text.label(node, "Force", "sleep(0.02)", "zero_ftsensor()", call)
+        self._forced(node, "Force", "sleep(0.02)", "zero_ftsensor()", call)
+
+    def _forced(self, node: Element, title: str, *start: str) -> None:
+        self.text.label(node, title, *start)
         self.children(node)
         self.text.line("end_force_mode()", "stopl(5.0)")
 
     def _contributed(self, node: Element) -> None:
         kind, following = contributed.kind_of(node), self._following[node]
         title = node.get("strategyProgramNodeType") or "URCap"
-        if kind in self._skip or node.get("strategyURCapName") in self._skip:
+        if {kind, node.get("strategyURCapName")} & self._choices.skip:
             return
         if (lines := contributed.lines_of(node)) is not None:
             self.text.label(node, title, *lines)
+        elif (task := contributed.force_task(node)) is not None:
+            self._forced(node, title, task)
         elif (branch := contributed.branch_of(node)) is None:
             raise UnknownPartError(kind)
         elif not branch:
@@ -252,11 +317,6 @@ class Nodes:
             head, shown = (f"if ({self._grip}):", f"If {self._grip}") if branch == "if" else ("else:", "Else")
             more = following is not None and contributed.branch_of(following) == "else"
             self._branch(node, head, shown, more=more)
-
-
-def _value(node: Element, tag: str) -> str:
-    found = node.find(tag)
-    return "" if found is None else found.get("value") or ""
 
 
 def _refuse(node: Element) -> NoReturn:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from contextlib import nullcontext
+from itertools import chain
 from xml.etree.ElementTree import Element
 
 from tvist_plant.user_file import UserFileError
@@ -10,41 +11,39 @@ from tvist_server.polyscope.contributed import EXTERNAL_CONTROL
 from tvist_server.polyscope.expressions import UnknownPartError, script_name
 from tvist_server.polyscope.installation import Installation
 from tvist_server.polyscope.moves import TOWARDS
-from tvist_server.polyscope.nodes import Nodes, inside
+from tvist_server.polyscope.nodes import NONE, Choices, Nodes, inside
 from tvist_server.polyscope.references import References
 from tvist_server.polyscope.script_text import ScriptText
 
 _HEADER_ENDS = "# HEADER_END"
+_COUNTING = """global {0}=0
+global {0}_rate=0
+thread Timer_{0}():
+  while (True):
+    {0} = {0} + {0}_rate * get_steptime()
+    sync()
+  end
+end
+run Timer_{0}()"""  # for a timer
 
 
 def script_of(
-    name: str, tree: Element, installed: Callable[[str], Installation], skip: frozenset[str] = frozenset()
+    name: str, tree: Element, installed: Callable[[str], Installation], choices: Choices = NONE
 ) -> str:
-    """Return the text of a program.
+    """Return the text of a program from the content of its file; UserFileError if nodes cannot be translated.
 
-    Args:
-        name: Name of the program.
-        tree: Content of its file.
-        installed: Returns the installation of a name.
-        skip: Names of URCaps, or `URCap: node`, whose nodes are left out.
-
-    Raises:
-        UserFileError: It has nodes that cannot be translated.
+    `installed` returns the installation of a name.
     """
     root, main = tree.find("./children"), tree.find("./children/MainProgram")
     if root is None or main is None or main.find("./children/*") is None:
         raise UserFileError("it has no program that can be read: save it in PolyScope as a script")
-    before, threads = root.findall("./SpecialSequence"), root.findall("./Thread")
+    begin, before, threads = map(root.findall, ("./InitVariablesNode", "./SpecialSequence", "./Thread"))
     references = References(tree)
     functions = _functions(root, references)
-    numbers = {
-        node: number
-        for number, node in enumerate(
-            (node for part in (*before, main, *threads, *functions.values()) for node in inside(part)), 1
-        )
-    }
+    parts = (*begin, *before, main, *threads, *functions.values())
+    numbers = {node: number for number, node in enumerate(chain.from_iterable(map(inside, parts)), 1)}
     given = installed(tree.get("installation") or "default")
-    nodes = Nodes(references, given, numbers, skip)
+    nodes = Nodes(references, given, numbers, choices)
     text = nodes.text
     for title, function in functions.items():
         with text.block(f"def {title}():"):
@@ -69,6 +68,7 @@ def script_of(
         raise UserFileError(f"PolyScope saved it with {found}, which cannot be simulated")
     start = ScriptText()
     start.line(*given.start(), *(f"global {at}={value}" for at, value in nodes.moves.waypoints.items()))
+    start.line(*(_COUNTING.format(timer) for timer in nodes.timers))
     if nodes.moves.has_directions:
         start.line(TOWARDS)
     return program_text(name, f"{start}{text}")
