@@ -74,8 +74,8 @@ def stream_once(operator):
 def test_operator_moves_and_streams_and_receives_everything(operator):
     with operator.control("anna") as token:
         motion = operator.command("move_j", token=token, q=NEAR)["id"]
-        operator.wait("event", lambda event: event["kind"] == "motion_done" and event["id"] == motion)
-        assert operator.state()["target_q"] == pytest.approx(NEAR, abs=1e-6)
+        done = operator.wait("event", lambda event: event["kind"] == "motion_done" and event["id"] == motion)
+        assert operator.until(done["tick"])["target_q"] == pytest.approx(NEAR, abs=1e-6)
         assert operator.wait("truth")["type"] == "truth"
     stream_once(operator)
 
