@@ -364,7 +364,7 @@ def test_scene_that_mujoco_cannot_read_is_refused_in_one_line(tmp_path, text, sa
 def test_scene_that_takes_too_long_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(apart, "LONGEST", 1)
     with pytest.raises(SceneError, match="exit code -14: a scene may take 1 s"):
-        world(tmp_path, around(60_000 * '<geom size="0.1" pos="3 3 3"/>'))
+        world(tmp_path, around(45_000 * '<geom size="0.1" pos="3 3 3"/>'))
 
 
 def test_missing_scene_lists_those_of_the_package():
