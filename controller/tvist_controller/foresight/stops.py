@@ -1,6 +1,6 @@
 """Simulation of future references, and planning of stops: which are permitted, and the quickest.
 
-See docs/explanations/design-notes.md.
+See docs/reference/stops.md.
 """
 
 import math
