@@ -238,8 +238,20 @@ CARRIED = 'centerOfGravity="0, 0, 0.05"'
 PAYLOAD = f'<PayloadSettings><Payload mass="1.5" defaultPayload="true" {CARRIED}/></PayloadSettings>'
 
 
-@pytest.mark.parametrize("payload", [(f'toolPayload="1.5" {CARRIED}', ""), ("", PAYLOAD)])
-def test_the_installation_gives_tcp_payload_signals_features_and_variables(tmp_path, payload):
+@pytest.mark.parametrize(
+    ("payload", "variables"),
+    [
+        ((f'toolPayload="1.5" {CARRIED}', ""), b"#\ncount=3\n"),
+        (
+            ("", PAYLOAD),
+            gzip.compress(
+                b'<InstallationVariables><variable name="count" value="3"/></InstallationVariables>'
+            ),
+        ),
+    ],
+    ids=["lines", "packed XML"],
+)
+def test_the_installation_gives_tcp_payload_signals_features_and_variables(tmp_path, payload, variables):
     lamp = "<Set type='DigitalOutput'><pin referencedName='lamp'/><digitalValue>1</digitalValue></Set>"
     own = move(waypoint("A", Q), useActiveTCP="false", inside="<tcp referencedName='hook'/>")
     home = "<SafeHome positionOptionType='SPEED_AND_ACCELERATION' speed='1' acceleration='2'/>"
@@ -248,7 +260,7 @@ def test_the_installation_gives_tcp_payload_signals_features_and_variables(tmp_p
     ready = f"<Wait type='Condition'>{expression(signal)}</Wait>"
     (tmp_path / "p.urp").write_text(saved(lamp, own, home, tcp, ready))
     (tmp_path / "cell.installation").write_text(INSTALLATION.format(*payload))
-    (tmp_path / "cell.variables").write_text("#\ncount=3\n")
+    (tmp_path / "cell.variables").write_bytes(variables)
     text = read_program(tmp_path / "p.urp")
     expected = (
         "set_tcp(p[0.0, 0.0, 0.2, 0.0, 0.0, 0.0])", "set_payload(1.5, [0.0, 0.0, 0.05])", "global count = 3",

@@ -57,16 +57,24 @@ def _installation(program: Path, name: str) -> Installation:
         path = folder / f"{Path(name).name}.installation"
         if path.is_file():
             variables = path.with_suffix(".variables")
-            values = (
-                read_bytes(variables, "variables").decode(errors="replace") if variables.is_file() else ""
-            )
-            return _parsed(f"installation {path}", read_bytes(path, "installation"), values)
+            values = read_bytes(variables, "variables") if variables.is_file() else b""
+            return _parsed(path, read_bytes(path, "installation"), values)
     return Installation()
 
 
 @lru_cache(maxsize=1)  # the programs of a folder share it
-def _parsed(what: str, data: bytes, variables: str) -> Installation:
+def _parsed(path: Path, data: bytes, variables: bytes) -> Installation:
+    what = f"installation {path}"
     try:
-        return Installation.of(xml(unpacked(what, data)), variables)
+        tree, values = xml(unpacked(what, data)), unpacked(f"variables of {what}", variables)
+        return Installation.of(tree, _values(values))
     except ValueError as error:
         raise UserFileError(f"{what}: {error}") from error
+
+
+def _values(data: bytes) -> dict[str, str]:
+    """Return the variables of a variables file: XML, or lines in older ones."""
+    if data.lstrip().startswith(_XML):
+        return {one.get("name") or "": one.get("value") or "" for one in xml(data).iter("variable")}
+    lines = (line.partition("=") for line in data.decode(errors="replace").splitlines())
+    return {name: value for name, equals, value in lines if equals and not name.startswith("#")}

@@ -39,8 +39,8 @@ class Installation:
     home: Pose | None = None  # joint angles of the safe home position [rad]
 
     @classmethod
-    def of(cls, tree: Element, variables: str = "") -> Self:
-        """Return the content of an installation file and of the variables file beside it."""
+    def of(cls, tree: Element, variables: dict[str, str]) -> Self:
+        """Return the content of an installation file, with the variables of the file beside it."""
         tcps = {
             tcp.get("name") or "": Tcp(numbers(tcp.get("offset"), 6), *_payload(tcp))
             for tcp in tree.findall("./TCPSettings/availablePoses/tcp")
@@ -65,11 +65,9 @@ class Installation:
             and (place := one.find("toolPosition")) is not None
             and (turn := one.find("toolAxisAngle")) is not None
         }
-        lines = (line.partition("=") for line in variables.splitlines() if not line.startswith("#"))
-        values = {name: value for name, equals, value in lines if equals}
         home = tree.find("SafeHomeSettings")
         at = None if home is None or home.get("enabled") != "true" else numbers(home.get("position"), 6)
-        return cls(tcps, active, pins, features, values, at)
+        return cls(tcps, active, pins, features, variables, at)
 
     def pin(self, name: str) -> str:
         """Return the signal with a name of the installation, or the name itself."""
