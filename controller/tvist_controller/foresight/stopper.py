@@ -53,7 +53,7 @@ class Stopper:
             return None
         plan = self.plan_stop(deceleration)
         self._wanted = wanted
-        if plan is None:
+        if plan is None or (plan.trajectory is None and cycle.mode is LineMode.RUNNING_OUT):
             return None
         if plan.trajectory is None:
             cycle.begin(cycle.trajectory, LineMode.RUNNING_OUT)
