@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from tvist_client.transports import InProcessRobot, LoopbackTransport, Transport, ZenohTransport
     from tvist_protocol.errors import ProtocolError, RefusedError, TvistError
     from tvist_protocol.info import Info
-    from tvist_protocol.motions import ArcSegment, JointSegment, LineSegment, ProcessSegment
+    from tvist_protocol.motions import ArcSegment, JointSegment, LineSegment, ProcessSegment, TrajectoryPoint
     from tvist_protocol.stream import Event, State, Telemetry, Truth
     from tvist_protocol.values import Payload
 
@@ -35,7 +35,8 @@ __all__ = [
     "InProcessRobot", "Info", "JointSegment", "LineSegment", "LoopbackTransport", "MisuseError", "Motion",
     "MotionStoppedError", "NotConnectedError", "Payload", "ProcessSegment", "ProtectiveStopError",
     "ProtocolError", "RefusedError", "Robot", "Servo", "State", "Stepper", "Stream", "StreamStoppedError",
-    "Telemetry", "Transport", "Truth", "TvistError", "UnexpectedReplyError", "ZenohTransport", "make_payload",
+    "Telemetry", "TrajectoryPoint", "Transport", "Truth", "TvistError", "UnexpectedReplyError", "ZenohTransport",
+    "make_payload",
 ]  # fmt: skip
 
 _NAMES = {
@@ -50,7 +51,7 @@ _NAMES = {
     "tvist_client.transports": "InProcessRobot LoopbackTransport Transport ZenohTransport",
     "tvist_protocol.errors": "ProtocolError RefusedError TvistError",
     "tvist_protocol.info": "Info",
-    "tvist_protocol.motions": "ArcSegment JointSegment LineSegment ProcessSegment",
+    "tvist_protocol.motions": "ArcSegment JointSegment LineSegment ProcessSegment TrajectoryPoint",
     "tvist_protocol.stream": "Event State Telemetry Truth",
     "tvist_protocol.values": "Payload",
 }

@@ -10,7 +10,7 @@ from tvist_client.waiting import BlockingBase, BlockingConnection, Stream
 from tvist_protocol.commands import Command
 from tvist_protocol.info import Info
 from tvist_protocol.io import Io, Registers
-from tvist_protocol.motions import ArcSegment, JointSegment, LineSegment, ProcessSegment
+from tvist_protocol.motions import ArcSegment, JointSegment, LineSegment, ProcessSegment, TrajectoryPoint
 from tvist_protocol.simulation import StepSetpoint
 from tvist_protocol.stream import Event, State, Telemetry, Truth
 from tvist_protocol.values import Payload
@@ -55,6 +55,7 @@ class Arm(BlockingBase):
         acceleration: float = 1.2, jerk: float = 60.0, wait: bool = True) -> Motion: ...
     def move_path(self, segments: Iterable[JointSegment | LineSegment | ProcessSegment | ArcSegment], *,
         frame: Iterable[float] | None = None, jerk: float = 60.0, wait: bool = True) -> Motion: ...
+    def move_trajectory(self, points: Iterable[TrajectoryPoint], *, wait: bool = True) -> Motion: ...
     def servo_j(self, q: Iterable[float], *, lookahead: float = 0.1, gain: float = 300.0,
         shaped: bool = False, duration: float | None = None) -> Motion: ...
     def speed_j(self, qd: Iterable[float], acceleration: float = 1.4, *, shaped: bool = False,

@@ -12,6 +12,7 @@ class Commands(Leased):
     move_l = Sent(motions.MoveL, move)
     move_c = Sent(motions.MoveC, move)
     move_path = Sent(motions.MovePath, move)
+    move_trajectory = Sent(motions.MoveTrajectory, move)
 
     servo_j = Sent(motions.ServoJ, guide)
     speed_j = Sent(motions.SpeedJ, guide, 2)

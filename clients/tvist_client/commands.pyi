@@ -7,7 +7,7 @@ from typing import Any, Literal
 from tvist_client.command import Leased
 from tvist_client.motion import Motion
 from tvist_protocol.io import Registers
-from tvist_protocol.motions import ArcSegment, JointSegment, LineSegment, ProcessSegment
+from tvist_protocol.motions import ArcSegment, JointSegment, LineSegment, ProcessSegment, TrajectoryPoint
 from tvist_protocol.values import Payload
 
 class Commands(Leased):
@@ -22,6 +22,7 @@ class Commands(Leased):
         acceleration: float = 1.2, jerk: float = 60.0, wait: bool = True) -> Motion: ...
     async def move_path(self, segments: Iterable[JointSegment | LineSegment | ProcessSegment | ArcSegment], *,
         frame: Iterable[float] | None = None, jerk: float = 60.0, wait: bool = True) -> Motion: ...
+    async def move_trajectory(self, points: Iterable[TrajectoryPoint], *, wait: bool = True) -> Motion: ...
     async def servo_j(self, q: Iterable[float], *, lookahead: float = 0.1, gain: float = 300.0,
         shaped: bool = False, duration: float | None = None) -> Motion: ...
     async def speed_j(self, qd: Iterable[float], acceleration: float = 1.4, *, shaped: bool = False,

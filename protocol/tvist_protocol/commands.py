@@ -8,7 +8,17 @@ from tvist_protocol.errors import ProtocolError, short
 from tvist_protocol.forces import EndForceMode, ForceMode, Freedrive, SetExternalWrench, ZeroFtsensor
 from tvist_protocol.io import SetIo, SetRegisters, SetTcp, SimulationSetInputs
 from tvist_protocol.kinematics import ForwardKinematics, InverseKinematics
-from tvist_protocol.motions import MoveC, MoveL, MovePath, ServoJ, SpeedJ, SpeedL, StopJ, StopL
+from tvist_protocol.motions import (
+    MoveC,
+    MoveL,
+    MovePath,
+    MoveTrajectory,
+    ServoJ,
+    SpeedJ,
+    SpeedL,
+    StopJ,
+    StopL,
+)
 from tvist_protocol.programs import (
     ProgramClosePopup,
     ProgramInterpret,
@@ -214,8 +224,8 @@ class RestartSafety(Leased, frozen=True, kw_only=True, tag="restart_safety"):
 
 Command = (
     TakeControl | KeepAlive | ReleaseControl | HandOver | TakeClock | ReleaseClock | MoveJ | MoveL
-    | MoveC | MovePath | ServoJ | SpeedJ | SpeedL | StopJ | StopL | ForceMode | Freedrive | EndForceMode
-    | ZeroFtsensor | SetExternalWrench | ServoStart | ServoStop | Stop | Pause | Resume | SetShaper
+    | MoveC | MovePath | MoveTrajectory | ServoJ | SpeedJ | SpeedL | StopJ | StopL | ForceMode | Freedrive
+    | EndForceMode | ZeroFtsensor | SetExternalWrench | ServoStart | ServoStop | Stop | Pause | Resume | SetShaper
     | SetEstimator | SetPayload | Forget | SetSpeed | SetIo | SetRegisters | SetTcp | InverseKinematics
     | ForwardKinematics | ProgramLoad | ProgramRun | ProgramPlay | ProgramPause | ProgramStop
     | ProgramClosePopup | ProgramInterpret | ProgramSkip | PowerOn | PowerOff | UnlockProtectiveStop

@@ -9,6 +9,7 @@ from tvist_protocol.values import (
     Acceleration,
     Blend,
     Duration,
+    JointAccelerations,
     Joints,
     JointSpeeds,
     Pose,
@@ -22,6 +23,7 @@ from tvist_protocol.values import (
 Orientation = Literal["interpolated", "tangent"]  # orientation of the tool on an arc
 
 MAX_SEGMENTS = 500  # largest number of segments of a path
+MAX_POINTS = 3000  # largest number of points of a trajectory
 
 
 class MoveL(Leased, frozen=True, kw_only=True, tag="move_l"):
@@ -145,6 +147,36 @@ class MovePath(Leased, frozen=True, kw_only=True, tag="move_path", omit_defaults
     """Frame in which all poses are given, as a pose in the base frame; null: the base frame."""
     jerk: ToolJerk = 60.0
     """Largest jerk of the tool [m/s³]; of the joints on joint segments, four times this number [rad/s³]."""
+
+
+class TrajectoryPoint(
+    Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True, gc=False
+):
+    """A posture that the joints pass at a given time."""
+
+    time: Annotated[float, Meta(ge=0, le=600)]
+    """Time since the start, before shaping [s]; 0.1 ms or more after the point before."""
+    q: Joints
+    """Posture, one angle per joint [rad]."""
+    qd: JointSpeeds | None = None
+    """Velocities there, one per joint [rad/s]; 0 at the end."""
+    qdd: JointAccelerations | None = None
+    """Accelerations there, one per joint [rad/s²]; only with `qd`."""
+
+
+class MoveTrajectory(Leased, frozen=True, kw_only=True, tag="move_trajectory"):
+    """Pass postures at given times; answered as `move_j` is.
+
+    The joints move between the points as with ROS 2's `joint_trajectory_controller`: on straight lines if the points
+    have positions only, on cubics if they have velocities, on quintics if they have accelerations too. The whole
+    trajectory is refused if it breaks a limit in any tick, before or after shaping; `why` names the first point.
+    A corner of straight lines changes the velocity within one tick, which the limits hardly allow: without
+    velocities, points must be a few milliseconds apart. Each joint is shaped, so the arm cuts bends a little.
+    """
+
+    points: Annotated[tuple[TrajectoryPoint, ...], Meta(min_length=1, max_length=MAX_POINTS)]
+    """Points in order, all with the same fields; a message has room for 1300 of six joints with accelerations. The
+    trajectory starts at rest at the present reference: a first point at time 0 must be within 0.01 rad of it."""
 
 
 class ServoJ(Leased, frozen=True, kw_only=True, tag="servo_j"):

@@ -12,7 +12,7 @@ from tvist_protocol.faults import FAULTS, Fault
 from tvist_protocol.info import CalibrationInfo, Info, Limits, Stopping, StopReason
 from tvist_protocol.io import Io, Registers
 from tvist_protocol.modes import RobotMode, RuntimeState, SafetyMode
-from tvist_protocol.motions import ArcSegment, JointSegment, LineSegment, ProcessSegment
+from tvist_protocol.motions import ArcSegment, JointSegment, LineSegment, ProcessSegment, TrajectoryPoint
 from tvist_protocol.replies import CODE_MEANINGS
 from tvist_protocol.schema import components, field_docs
 from tvist_protocol.simulation import StepSetpoint
@@ -22,6 +22,9 @@ from tvist_protocol.values import PATTERN_MEANINGS, Payload
 
 Schema = Mapping[str, Any]
 Struct = type[msgspec.Struct]
+_PARTS: tuple[Struct, ...] = (
+    Payload, Registers, StepSetpoint, TrajectoryPoint, JointSegment, LineSegment, ProcessSegment, ArcSegment,
+)  # fmt: skip
 
 MESSAGES = """\
 # What a client sends
@@ -135,9 +138,7 @@ def _tables() -> dict[str, str]:
         "keys": markdown_table(("key", "kind", "by", "carries", "what"), map(_channel_row, CHANNELS)),
         "commands": _messages(COMMANDS),
         "setpoint": _messages((Setpoint,)),
-        "parts": _messages(
-            (Payload, Registers, StepSetpoint, JointSegment, LineSegment, ProcessSegment, ArcSegment)
-        ),
+        "parts": _messages(_PARTS),
         "replies": _messages(REPLIES),
         "codes": markdown_table(
             ("code", "meaning"), ((f"`{code}`", text) for code, text in CODE_MEANINGS.items())

@@ -124,6 +124,7 @@ TRANSITIONS: tuple[Transition, ...] = (
     Transition("move_l", (_A.REST,), _A.MOVING),
     Transition("move_c", (_A.REST,), _A.MOVING),
     Transition("move_path", (_A.REST,), _A.MOVING),
+    Transition("move_trajectory", (_A.REST,), _A.MOVING),
     Transition("servo_j", _GUIDABLE, _A.GUIDED),
     Transition("speed_j", _GUIDABLE, _A.GUIDED),
     Transition("speed_l", _GUIDABLE, _A.GUIDED),

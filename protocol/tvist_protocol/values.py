@@ -45,6 +45,9 @@ Period = Annotated[float, Meta(ge=0.002, le=0.1)]  # [s], between one tick and 1
 JointSpeed = Annotated[float, Meta(ge=-1e3, le=1e3)]  # [rad/s]
 JointSpeeds = Annotated[tuple[JointSpeed, ...], Meta(min_length=1, max_length=7)]
 """One velocity per joint [rad/s]"""
+JointAcceleration = Annotated[float, Meta(ge=-1e5, le=1e5)]  # [rad/s²]
+JointAccelerations = Annotated[tuple[JointAcceleration, ...], Meta(min_length=1, max_length=7)]
+"""One acceleration per joint [rad/s²]"""
 Duration = Annotated[float, Meta(gt=0, le=3600)]  # [s]
 Transition = Annotated[float, Meta(ge=0, le=3600)]  # [s]
 Fraction = Annotated[float, Meta(ge=0, le=1)]  # [-]

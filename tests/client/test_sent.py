@@ -156,6 +156,7 @@ async def test_an_answer_of_another_type_raises_an_error_naming_both_types(host,
 POSITIONAL = """
     forward_kinematics(q) force_mode(compliant,wrench) freedrive(free,frame) hand_over(client) inject(fault)
     inverse_kinematics(pose) load_program(name,text) move_c(via,pose) move_j(q) move_l(pose) move_path(segments)
+    move_trajectory(points)
     reset(q) run_program(text) servo_j(q) set_estimator(name) set_payload(mass,com,inertia)
     set_registers(bank,values,first) set_shaper(name,modes) set_speed(fraction) set_tcp(offset) speed_j(qd,acceleration)
     speed_l(xd,acceleration) stop(deceleration) stop_j(acceleration) stop_l(acceleration)

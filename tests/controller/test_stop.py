@@ -8,12 +8,13 @@ from tvist_controller.foresight.stops import DECELERATION_RATIO, StopPlanner
 from tvist_controller.kinematics.arm import InverseDynamics
 from tvist_controller.line.differentiator import Target
 from tvist_controller.line.limits import GENTLEST_STOP, TORQUE_SHARE, StopTorque, acceleration_on_way
+from tvist_controller.line.line_mode import LineMode
 from tvist_controller.trajectory import JointLine, MotionLimits, quickest_motion
 from tvist_protocol import commands as c
-from tvist_protocol.replies import Accepted
+from tvist_protocol.replies import Accepted, Done
 from tvist_protocol.simulation import SimulationInject, SimulationReset
 
-from .robots import PAPER, Q1, Q2, Q3, UR5E, H, Robot, without_arm
+from .robots import PAPER, Q1, Q2, Q3, UR5E, H, NoArm, Robot, without_arm
 
 
 def test_a_stop_is_no_later_and_no_further_than_the_move(robot):
@@ -69,6 +70,20 @@ def test_only_a_harder_stop_replaces_a_gentle_one():
     assert way(2.0, None) < way(2.0) - 0.1
     assert way(2.0, 1.0) == way(2.0)
     assert way(None, 1.0) == way(None)
+
+
+def test_a_harder_stop_lets_a_motion_run_out_that_already_does():
+    ran_out = 0
+    for moment in range(532, 536):  # about to rest, so in some of them no stop is as quick
+        robot = Robot(plant=NoArm())
+        robot.send(c.MoveJ, q=tuple(Q1 + 0.5))
+        robot.tick(moment)
+        robot.send(c.Stop, deceleration=1.0)
+        ran_out += robot.controller.cycle.mode is LineMode.RUNNING_OUT
+        assert robot.send(c.Stop) == Done()
+        robot.until_rest()
+        assert robot.kinds().count("motion_stopped") == 1
+    assert ran_out
 
 
 @pytest.mark.parametrize(("name", "way"), [("um_zv", 0.003), ("um_zv", 0.6), ("um_zvd", 0.05)])

@@ -3,6 +3,8 @@
 import numpy as np
 
 from tvist_lab.workspace import workspace
+from tvist_plant.plant import PERIOD
+from tvist_protocol.motions import TrajectoryPoint
 from tvist_shaping import BUILT_IN
 
 Random = np.random.Generator
@@ -55,3 +57,39 @@ def above(description, random):
     """Return the name of a limit and a value of it that the robot must refuse."""
     name = str(random.choice(list(CODES)))
     return name, own_limits(description)[name] * float(random.choice([1.0001, random.uniform(1.0, 3.0)]))
+
+
+def points(random, q, kind):
+    """Return points of a trajectory from a posture: one in ten hurries somewhere, most others keep the limits.
+
+    The kinds are "linear" (dense points of a smooth motion), "cubic" and "quintic".
+    """
+    count = int(random.integers(1, 6))
+    if kind == "linear":
+        count = int(random.integers(300, 900))
+        swing = 0.5 - 0.5 * np.cos(np.pi * np.arange(count + 1) / count)
+        positions = q + swing[:, None] * random.uniform(-0.2, 0.2, len(q))
+        gaps = np.full(count, PERIOD * random.choice([1.0, 1.5, 2.0]))
+    else:
+        positions = q + np.cumsum(random.uniform(-0.3, 0.3, (count + 1, len(q))), axis=0)
+        gaps = random.uniform(0.5, 1.5, count)
+    positions[0] = q
+    speeds, bends = random.uniform(-0.3, 0.3, (2, count + 1, len(q)))
+    speeds[[0, -1]] = 0.0
+    if random.random() < 0.1:
+        gaps[int(random.integers(count)) :] *= random.uniform(0.02, 0.3)
+    times = np.concatenate(([0.0], np.cumsum(gaps)))
+    given = {"q": positions} | {
+        "linear": {},
+        "cubic": {"qd": speeds},
+        "quintic": {"qd": speeds, "qdd": bends},
+    }[kind]
+    first = int(random.random() < 0.5)  # the start may be left out, where it has no acceleration
+    bends[0] *= 1 - first
+    return tuple(
+        TrajectoryPoint(
+            time=float(time), **{name: tuple(rows[number].tolist()) for name, rows in given.items()}
+        )
+        for number, time in enumerate(times)
+        if number >= first
+    )

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 import numpy as np
+from tests.search import draws
 from tests.search.subject import Subject
 
 from tvist_controller.api.line import Arm, placement_vector, turned
@@ -55,6 +56,11 @@ def path(robot, random):
     return robot.send(m.MovePath, segments=tuple(segments))
 
 
+def trajectory(robot, random):
+    kind = str(random.choice(["linear", "cubic", "quintic"]))
+    return robot.send(m.MoveTrajectory, points=draws.points(random, robot.references[-1], kind))
+
+
 def servo(robot, random):
     q = robot.references[-1] + random.uniform(-0.4, 0.4, robot.description.joints)
     limit = np.array(robot.description.limits.position)
@@ -97,6 +103,7 @@ SENT: dict[str, tuple[float, Callable[[Subject, Random], Reply]]] = {
     "line": (6.0, line),
     "arc": (3.0, arc),
     "path": (4.0, path),
+    "trajectory": (4.0, trajectory),
     "servo_j": (4.0, servo),
     "speed_j": (4.0, joint_speed),
     "speed_l": (4.0, tool_speed),

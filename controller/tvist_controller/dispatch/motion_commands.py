@@ -12,6 +12,7 @@ from tvist_controller.planning.move_planner import MovePlanner, PlannedMove
 from tvist_controller.planning.path_planner import PathPlanner
 from tvist_controller.planning.plan import CommandCall, CommandRow, Planning
 from tvist_controller.planning.snapshot import MOTION
+from tvist_controller.planning.trajectory_planner import TrajectoryPlanner, check_points
 from tvist_controller.refusal import (
     SLOWEST,
     RefusalError,
@@ -32,6 +33,7 @@ from tvist_protocol.transitions import Activity
 
 _STRAIGHT = Planning(MOTION, MovePlanner, MovePlanner.move, partial(MovePlanner.move, at_once=True))
 _ALONG_PATH = Planning(MOTION, PathPlanner, PathPlanner.plan)
+_THROUGH_POINTS = Planning(MOTION, TrajectoryPlanner, TrajectoryPlanner.plan)
 
 
 def _check_limits(command: c.MoveJ | c.ServoStart, description: RobotDescription) -> None:
@@ -157,6 +159,7 @@ ROWS: tuple[CommandRow, ...] = (
     CommandRow(m.MoveL, _move, check=_check_tool_move, plan=_ALONG_PATH),
     CommandRow(m.MoveC, _move, check=_check_tool_move, plan=_ALONG_PATH),
     CommandRow(m.MovePath, _move, check=_check_path, plan=_ALONG_PATH, long=True),
+    CommandRow(m.MoveTrajectory, _move, check=check_points, plan=_THROUGH_POINTS, long=True),
     CommandRow(c.ServoStart, _servo_start, check=_check_limits),
     CommandRow(c.ServoStop, lambda robot, _: robot.motion.end_stream()),
     CommandRow(c.Stop, _stop, lease="if named", stops=True),

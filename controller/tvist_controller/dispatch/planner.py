@@ -9,6 +9,7 @@ from tvist_controller.planning.move_planner import MovePlanner
 from tvist_controller.planning.path_planner import PathPlanner
 from tvist_controller.planning.plan import Plan, PlanResult
 from tvist_controller.planning.snapshot import FilterState, PlanningState
+from tvist_controller.planning.trajectory_planner import TrajectoryPlanner
 from tvist_controller.programs.compiling import ScriptCompiler
 from tvist_controller.refusal import RefusalError
 from tvist_controller.setup import Setup
@@ -25,7 +26,8 @@ class Planner:
         moves, kinematic = MovePlanner(setup, self.filters), KinematicPlanner(setup.description)
         self._scripts = ScriptCompiler(setup.description)
         paths = PathPlanner(setup, self.filters, moves, kinematic)
-        planners = (self.filters, moves, paths, kinematic, self._scripts)
+        trajectories = TrajectoryPlanner(setup, self.filters, moves)
+        planners = (self.filters, moves, paths, trajectories, kinematic, self._scripts)
         self._planners: dict[type, Any] = {type(one): one for one in planners}
 
     def rehearse_scripts(self) -> None:

@@ -12,11 +12,12 @@ from tvist_controller.line.differentiator import Floats, Target
 from tvist_controller.line.limits import GENTLEST_STOP, StreamTorqueMargin
 from tvist_controller.line.line_mode import Guard, Obstacle
 from tvist_controller.refusal import RefusalError
-from tvist_controller.trajectory import CheckedMotion, JointStop, PlannedMotion
+from tvist_controller.trajectory import CheckedMotion, JointStop, PlannedMotion, PointLaw
 from tvist_plant.description import Payload
 from tvist_plant.plant import PERIOD
 from tvist_shaping.base import Filter
 
+FORESEEN = 2000  # largest number of ticks of the rest of a trajectory that is simulated with the filter
 MARGIN = 0.8
 """Fraction of the acceleration that torque permits at the start of a stop; the margin is for changes on the way [-]."""
 
@@ -181,6 +182,13 @@ class RemainingMotion:
         trajectory = cycle.trajectory
         if (forecast := trajectory.forecast) is not None:
             return self._first([forecast.path.way(cycle.along.position, forecast.end), *coming])
+        if isinstance(trajectory, PlannedMotion) and isinstance(law := trajectory.law, PointLaw):
+            going_on = trajectory.fork()
+            going_on.release(1.0)  # a pause may end
+            left = law.after(max(trajectory.time - cycle.tvist.delay, 0.0))
+            return self._on(left) or self._on(
+                self._stopper.simulate_until_rest(tvist, going_on) if len(left) < FORESEEN else None
+            )
         if trajectory.foreseeable and (ahead := self._stopper.simulate_until_rest(tvist)) is not None:
             return self._on(ahead)
         guard = self._guide_guard if cycle.guard is self._guide_guard else self._guard
@@ -207,11 +215,12 @@ class RemainingMotion:
             raise RefusalError("collision", "com", why, CLEARANCE)
 
     def check_filter(self, tvist: Filter) -> None:
-        """Raise RefusalError if the rest of a stream or guided motion would collide with another filter."""
-        cycle = self._cycle
-        if not (cycle.mode.guarded and cycle.trajectory.foreseeable):
+        """Raise RefusalError if the rest of a motion whose joints are shaped would collide with another filter."""
+        cycle, trajectory = self._cycle, self._cycle.trajectory
+        curved = trajectory.path is not None and trajectory.path.curved
+        if not ((cycle.mode.guarded or curved) and trajectory.foreseeable):
             return
-        met = self.rest_of_way(tvist, ())  # a stream or a guided motion has no parts
+        met = self.rest_of_way(tvist, ())  # such motions have no parts
         if met is not None:
             raise RefusalError("collision", "name", f"{met} on the rest of the way", CLEARANCE)
 

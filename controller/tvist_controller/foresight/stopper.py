@@ -11,7 +11,7 @@ from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.limits import torque_along
 from tvist_controller.line.line_mode import LineMode
-from tvist_controller.trajectory import AnyStop, BrakingForecast, StuckError, Trajectory
+from tvist_controller.trajectory import AnyStop, BrakingForecast, Path, StuckError, Trajectory
 from tvist_plant.plant import PERIOD
 from tvist_shaping.base import Filter
 
@@ -53,7 +53,7 @@ class Stopper:
             return None
         plan = self.plan_stop(deceleration)
         self._wanted = wanted
-        if plan is None:
+        if plan is None or (plan.trajectory is None and cycle.mode is LineMode.RUNNING_OUT):
             return None
         if plan.trajectory is None:
             cycle.begin(cycle.trajectory, LineMode.RUNNING_OUT)
@@ -68,7 +68,9 @@ class Stopper:
 
     def plan_stop(self, deceleration: float | None) -> StopPlan | None:
         """Return the quickest permitted stop from the present state without starting it; see `stop`."""
-        forecast = self._cycle.trajectory.forecast
+        forecast, path = self._cycle.trajectory.forecast, self._cycle.trajectory.path
+        if path is not None and path.curved:
+            return self._on_curve(path, deceleration)
         return self._by_joints(deceleration) if forecast is None else self._on_path(forecast, deceleration)
 
     def _by_joints(self, deceleration: float | None) -> StopPlan | None:
@@ -113,6 +115,16 @@ class Stopper:
         if quickest is not None:
             return self._plan(quickest, deceleration, quickest.duration, quickest.end)
         return None if stopping else runs_out
+
+    def _on_curve(self, path: Path, deceleration: float | None) -> StopPlan | None:
+        """Slow the time of a motion down, of which only the simulation knows the shaped way."""
+        cycle, stopping = self._cycle, self._cycle.mode is LineMode.STOPPING
+        ahead = LineSimulation(*cycle.fork())
+        stop = self.stops.on_curve(ahead, cycle.along.published, path, deceleration)
+        lasts = max((ahead.last - 1) * PERIOD, 0.0) if ahead.rests else math.inf
+        if stop is not None and stop.duration < lasts:
+            return self._plan(stop, deceleration, stop.duration, stop.end)
+        return None if stopping else self._plan(None, deceleration, lasts, ahead.references[-1])
 
     def _plan(self, stop: AnyStop | None, wanted: float | None, duration: float, end: Floats) -> StopPlan:
         kept = None if stop is None else stop.acceleration

@@ -20,6 +20,7 @@ from tvist_controller.trajectory import (
     BrakingForecast,
     JointStop,
     MotionLimits,
+    Path,
     PathStop,
     SlowedStop,
     Trajectory,
@@ -75,6 +76,7 @@ HARDER = 1.05
 """Factor by which a stop must brake harder than the motion to be never ahead of it, since a varying filter
 may brake slightly harder than its reference [-]."""
 TURN_BACK_SPEED = 3e-3  # speed below which interpolation may turn a shaped motion back slightly [rad/s]
+SLOW = 0.05  # speed below which a motion's time stops as if it had this speed [rad/s]
 SOON = 0.02  # a motion that brakes later than this is by then ahead of a stop [s]
 COUNTED = 0.9  # fraction of its velocity that a motion is assumed to keep until it brakes [-]
 ROUNDING = 1e-12  # position differences below this are rounding errors [rad]
@@ -182,6 +184,29 @@ class StopPlanner:
             for acceleration in self._ladder(wanted)
         )
         return _first(filter(permitted, stops), lambda stop, rebound: torque.holds(stop, rebound=rebound))
+
+    def on_curve(
+        self, ahead: LineSimulation, state: Target, path: Path, wanted: float | None
+    ) -> SlowedStop | None:
+        """Return the quickest `SlowedStop` within the limits, else the gentlest; None for a motion about to rest.
+
+        Arguments as in `under`; the motion is simulated as far as the stops need it.
+        """
+        fastest, jerk = max(float(np.abs(state.qd).max()), SLOW), 0.5 * self.jerk
+        torque = StopTorque(self._dynamics, state, self._torque)
+
+        def stop(acceleration: float) -> SlowedStop:
+            longest = fastest / acceleration + acceleration / jerk
+            ahead.until(math.ceil(longest / PERIOD) + 2)
+            samples = np.array(ahead.samples)
+            return SlowedStop(path, samples, acceleration=acceleration, jerk=jerk, fastest=fastest)
+
+        ahead.until(2)
+        if len(ahead.samples) < 4:
+            return None
+        stops = (made for made in map(stop, self._ladder(wanted)) if made.hardest <= self.highest)
+        held = _first(stops, lambda stop, rebound: torque.holds(stop, rebound=rebound))
+        return stop(GENTLEST_STOP) if held is None else held
 
     def _behind(self, stop: PathStop | SlowedStop, along: Sequence[float]) -> bool:
         """Return whether a stop is never ahead of a motion; `along` is the motion's distance at each tick."""

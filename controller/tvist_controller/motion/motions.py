@@ -110,7 +110,7 @@ class RunningMove:
         most = trajectory.agility.acceleration
         newest = cycle.along.newest
         speed = max(trajectory.velocity, float(np.abs(newest.qd).max()))
-        left = trajectory.path.end - newest.q
+        left = trajectory.bearing(newest.q)
         farthest = float(np.abs(left).max())
         way = left * min(speed * speed / (most * max(farthest, STILL)), 1.0)
         limits = np.array(cycle.description.limits.torque)

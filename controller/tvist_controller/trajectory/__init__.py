@@ -3,6 +3,7 @@
 from tvist_controller.trajectory.base import (
     BrakingForecast,
     CheckedMotion,
+    JointCurve,
     JointLine,
     MotionLimits,
     Path,
@@ -13,6 +14,7 @@ from tvist_controller.trajectory.base import (
 from tvist_controller.trajectory.compliant import Compliant, ForceTask
 from tvist_controller.trajectory.guided import Guided, ServoFollower, StuckError
 from tvist_controller.trajectory.motion import DoubleS, PlannedMotion, at_least, quickest_motion
+from tvist_controller.trajectory.points import PointLaw
 from tvist_controller.trajectory.speed import VelocityFollower
 from tvist_controller.trajectory.stop import JointStop, PathStop, SlowedStop
 from tvist_controller.trajectory.stream import SetpointStream
@@ -27,12 +29,14 @@ __all__ = [
     "DoubleS",
     "ForceTask",
     "Guided",
+    "JointCurve",
     "JointLine",
     "JointStop",
     "MotionLimits",
     "Path",
     "PathStop",
     "PlannedMotion",
+    "PointLaw",
     "Rest",
     "SampledPositions",
     "ServoFollower",

@@ -46,6 +46,8 @@ class Path(ABC):
 
     posture_of: Posture | None
     """Function from parameter to joint positions; None if they are the same."""
+    curved = False
+    """Whether the parameter does not go straight, so that only its time law knows the way."""
 
     def __init__(self, start: Floats, end: Floats) -> None:
         self.start, self.end = start, np.array(end, dtype=float)
@@ -112,6 +114,12 @@ class JointLine(Path):
         """Return the straight line between two postures."""
         way = end - start
         return CheckedMotion(lambda share: start + share * way, way)
+
+
+class JointCurve(JointLine):
+    """A way between two postures that the time law knows; filter and stops act on the joints, as on a line."""
+
+    curved = True
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ import numpy as np
 import ruckig
 
 from tvist_controller.trajectory.base import BrakingForecast, Floats, MotionLimits, Path, Trajectory
+from tvist_controller.trajectory.points import PointLaw
 from tvist_controller.trajectory.retiming import RetimedLaw
 from tvist_controller.trajectory.spline import SplineCurve
 from tvist_plant.plant import PERIOD
@@ -87,6 +88,7 @@ SOONER = 25  # ticks that a pause must save to be worthwhile
 
 SURELY = 0.12
 """If the motion brakes later than this plus the pause's extra time, the pause is certainly sooner [s]."""
+LATEST = 0.3  # time that a pause on a curve may take beyond that for its speed [s]
 
 
 class DoubleS:
@@ -141,7 +143,7 @@ class PlannedMotion(Trajectory):
     def __init__(
         self,
         path: Path,
-        law: DoubleS | RetimedLaw,  # from the path's start to its end
+        law: DoubleS | RetimedLaw | PointLaw,  # from the path's start to its end
         speed: float = 1.0,  # initial rate of its time relative to the clock's [-]
         agility: MotionLimits | None = None,  # of a change of the rate; None for those of the law
     ) -> None:
@@ -209,8 +211,10 @@ class PlannedMotion(Trajectory):
         return self.finished or (self.rate == 0.0 and self.steady)
 
     @property
-    def forecast(self) -> BrakingForecast:
-        """Forecast of the motion; the time of braking is known only at constant rate."""
+    def forecast(self) -> BrakingForecast | None:
+        """Forecast of the motion, except on a curve; the time of braking is known only at constant rate."""
+        if self.path.curved:
+            return None
         time, rate = self.time, self._pace.rate
         known = rate > 0.0 and self.steady
         limits = self.limits if self.steady else self.agility
@@ -232,6 +236,10 @@ class PlannedMotion(Trajectory):
         """Present velocity of the leading entry of the parameter [rad/s]."""
         return float(np.abs(self.law.at(self.time)[1]).max()) * self._pace.rate
 
+    def bearing(self, q: Floats) -> Floats:
+        """Return a vector along the coming way from the parameter q, shape (m,)."""
+        return np.array(self.law.at(self.time)[1]) if self.path.curved else self.path.end - q
+
     def hold(self, acceleration: float) -> bool:
         """Pause the motion if it then stands noticeably sooner; return whether it pauses.
 
@@ -241,15 +249,22 @@ class PlannedMotion(Trajectory):
         """
         paused = self.fork()
         paused.speed, paused._pace.acceleration = 0.0, acceleration  # noqa: SLF001  one of its own kind
+        if not self._pays(paused, acceleration):
+            return False
+        self.speed, self._pace.acceleration = 0.0, acceleration
+        return True
+
+    def _pays(self, paused: Self, acceleration: float) -> bool:
+        """Return whether the motion stands noticeably sooner if it is paused."""
         most, forecast = self.limits.acceleration, self.forecast  # the motion's own braking
+        if forecast is None:
+            longest = self.limits.velocity / acceleration + LATEST
+            return self.time + self.rate * longest < self.duration or _stands_sooner(paused, self.fork())
         longer = self.velocity * (1.0 / acceleration - 1.0 / most) + 2.0 * most / self.limits.jerk
         hardest = self.agility.acceleration <= most
         if forecast.steady == 0.0 and self.rate == 1.0 and self.steady and hardest:
             return False  # the motion already brakes as hard as it can
-        if forecast.steady < longer + SURELY and not _stands_sooner(paused, self.fork()):
-            return False
-        self.speed, self._pace.acceleration = 0.0, acceleration
-        return True
+        return forecast.steady >= longer + SURELY or _stands_sooner(paused, self.fork())
 
     def release(self, speed: float) -> None:
         """Resume after a pause at a rate [-]."""

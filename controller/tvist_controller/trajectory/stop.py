@@ -203,8 +203,10 @@ class SlowedStop(Trajectory):
         return self._ticks >= len(self._samples) - 1
 
     @property
-    def forecast(self) -> BrakingForecast:
-        """BrakingForecast of its motion, which brakes from the start."""
+    def forecast(self) -> BrakingForecast | None:
+        """BrakingForecast of its motion, which brakes from the start; None on a curve."""
+        if self.path.curved:
+            return None
         along = self._samples[:, self.path.leading]
         braking, jerk = (
             float(np.abs(np.diff(along, order)).max(initial=0.0)) / PERIOD**order for order in (2, 3)
