@@ -18,7 +18,7 @@ DOCS_READY := .venv-docs/.ready
 # The folders of the distributions: tvist-protocol, tvist-shaping, tvist-urscript and tvist.
 DISTRIBUTIONS := ./protocol ./shaping ./urscript .
 # The folders of what they install.
-SOURCES := cli clients controller lab protocol shaping sim_plant testing tvist_server urscript view
+SOURCES := cli clients controller lab protocol ros2 shaping sim_plant testing tvist_server urscript view
 
 .PHONY: acceptance checksums page docs docs-serve release setup demo notebooks test test-all durations lint elsewhere bench nightly search soak dist format lock schemas clean
 

@@ -39,6 +39,7 @@ GROUPS = {
         "view": "Show a robot on a web page, with magnified vibration.",
         "stop": "Stop a served robot, or all, even if another client has control; exit code 0 if at rest.",
         "unlock": "Make a stopped robot ready to move again; exit code 0 if it is.",
+        "ros2": "Connect a served robot with ROS 2.",
         "forget": "Discard what a served robot has learnt about its payload.",
     },
     "Logs": {"log": f"Use recordings and other robots' logs: {', '.join(LOG)}."},

@@ -29,6 +29,7 @@ _BOXES = {
     "Clock": "clock speed realtime_priority",
     "Recording": "record keep dump",
     "Network": "listen connect namespace metrics security insecure",
+    "ROS 2": "ros2",
     "UR's interfaces": "ur ur_address ur_ports ur_allow reserve_inputs",
 }
 """Boxes of the help, each with its fields."""

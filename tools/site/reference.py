@@ -9,7 +9,7 @@ from pathlib import Path
 
 from tools.site.tree import ROOT
 
-PROGRAMS = {"tvist_cli", "tvist_server", "tvist_view"}
+PROGRAMS = {"tvist_cli", "tvist_ros2", "tvist_server", "tvist_view"}
 """Packages that are run, not imported. Every other package has an API."""
 FOLDER = "api"  # folder of these pages in the site
 MANY = 15  # most exports of a module on a single page

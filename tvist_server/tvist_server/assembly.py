@@ -65,6 +65,11 @@ def check_together(config: ServeConfig, robots: int) -> None:
          "connect, metrics and workers exclude each other: run one server for each process, each with its own port"),
         (several and own is not None,
          f"listen is {own}, and {workers}: Unix sockets are for the server's own processes, so listen on tcp/ or tls/"),
+        (config.ros2 and config.security is not None,
+         "ros2 and security exclude each other: every ROS 2 node can move the robot, whatever its certificate allows"),
+        (config.ros2 and several, f"ros2 needs one process, and {workers}: run tvist ros2 for each robot instead"),
+        (config.ros2 and robots > 1 and config.clock != "realtime",
+         "ros2 needs one time for all robots, which in lockstep they do not have: serve one robot per ROS_DOMAIN_ID"),
     ):  # fmt: skip
         if wrong:
             raise StartError(why)
@@ -94,6 +99,7 @@ def security_of(config: ServeConfig, names: Sequence[str]) -> tuple[list[str], d
         security=None if config.connect else config.security,
         insecure=config.insecure,
         namespace=config.namespace or "",
+        ros2=config.ros2,
     )
 
 

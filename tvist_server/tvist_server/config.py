@@ -126,13 +126,16 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
         places += [f"through the router at {', '.join(self.connect)}"] if self.connect else []
         return " and ".join(places) + (f" in namespace {self.namespace}" if self.namespace else "")
 
+    @property
+    def reached(self) -> str:
+        """Endpoint at which clients on this machine reach the robots."""
+        first = (*self.endpoints, *self.connect)[0]
+        return first.replace("0.0.0.0", "127.0.0.1").replace("[::]", "[::1]")  # noqa: S104  only said
+
     def command_line(self, command: str, name: str) -> str:
         """Return the command line that runs `command` for a robot from this machine."""
         words = ["tvist", command]
-        first = (*self.endpoints, *self.connect)[0]
-        if first != DEFAULT_ENDPOINT:
-            here = first.replace("0.0.0.0", "127.0.0.1").replace("[::]", "[::1]")  # noqa: S104  only said
-            words.append(here)
+        words += [self.reached] if self.reached != DEFAULT_ENDPOINT else []
         words += ["--name", name] if name != DEFAULT_NAME else []
         words += ["--namespace", self.namespace] if self.namespace else []
         return " ".join([*words, "--security", "FOLDER"] if self.security is not None else words)

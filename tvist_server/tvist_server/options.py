@@ -127,6 +127,9 @@ class ServeOptions(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     programs: str | None = None
     """Folder with URScript programs, NAME.script or NAME.urp, that clients load by name. With several robots, a robot
     uses the subfolder of its name, if there is one."""
+    ros2: bool = False
+    """Also start tvist ros2, and be the router of ROS 2 nodes with rmw_zenoh, as rmw_zenohd is. Every ROS 2 node that
+    reaches the endpoint can move the robot. Several robots have the namespaces of their names."""
     ur: bool = False
     """Also open UR's own interfaces: RTDE, real-time client, dashboard, primary and secondary, interpreter mode. The
     profile is then ursim, unless you give another one or --enable-motion."""

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from tvist_controller.controller import Controller
 from tvist_controller.instruments.report import Sink
+from tvist_protocol.keys import within
 from tvist_server.assembly import (
     Share,
     check_paces,
@@ -28,6 +29,7 @@ from tvist_server.gateways.base import Gateway, Prepare, Starting
 from tvist_server.gateways.console import Console, ConsoleGateway
 from tvist_server.gateways.metrics import Metrics, MetricsGateway
 from tvist_server.gateways.network import Network
+from tvist_server.gateways.ros2 import Ros2Gateway
 from tvist_server.gateways.security import is_local
 from tvist_server.plan_ahead import PlanAhead
 from tvist_server.robot import ServedRobot
@@ -91,6 +93,7 @@ class Server:
             security=config.security if share.router is None else None,
             namespace=config.namespace or "",
             on_router=partial(self._tell_router, ", ".join(config.connect)) if share.router is None else None,
+            gossip=config.ros2,
         )
         try:
             self._console = Console()
@@ -147,6 +150,9 @@ class Server:
             self._interfaces.append(interfaces)
             self.ur.append((interfaces.address, interfaces.ports))
             gateways.append(interfaces)
+        if config.ros2:
+            place = within(config.namespace or "", name)
+            gateways.append(Ros2Gateway(config.reached, place, name if config.robots else ""))
         if self.metrics is not None:
             gateways.append(
                 self.metrics.add(MetricsGateway(config.namespace or "", name, lambda: robot.newest))

@@ -22,6 +22,8 @@ MESSAGES = (
     "declare_liveliness_subscriber", "liveliness_query",
 )  # fmt: skip
 """All message types of Zenoh's access control."""
+ROS2 = [f"{domain}/{rest}" for domain in range(233) for rest in ("**", "**/@adv/**")] + ["@ros2_lv/**"]
+"""Keys of ROS 2 nodes with rmw_zenoh: topics and services of each ROS_DOMAIN_ID, with history, and tokens."""
 
 
 def access_control(robots: Sequence[str], roles: Mapping[str, Role], namespace: str = "") -> dict[str, Any]:
@@ -37,16 +39,18 @@ def access_control(robots: Sequence[str], roles: Mapping[str, Role], namespace: 
     return _settings([*viewing, *operating], granted)
 
 
-def open_access(robots: Sequence[str], namespace: str = "") -> dict[str, Any]:
+def open_access(robots: Sequence[str], namespace: str = "", *, ros2: bool = False) -> dict[str, Any]:
     """Return Zenoh's `access_control` settings for a server without certificates: every client is an operator.
 
     Only the server may answer commands and publish the robot's topics; another session could otherwise
-    intercept a stop command or forge states.
+    intercept a stop command or forge states. With `ros2`, clients may do everything on the keys of ROS 2.
     """
     robots = [_at(namespace, robot) for robot in robots]
     # Keys with wildcards are allowed because egress is restricted below, and only the server answers queries.
     asking = ["declare_subscriber", "declare_liveliness_subscriber", "liveliness_query", "query"]
     rules = [*_viewing(robots), *_operating(robots), _rule("ask for anything", "ingress", asking, ["**"])]
+    if ros2:
+        rules.append({**_rule("ROS 2", "ingress", MESSAGES, ROS2), "flows": ["ingress", "egress"]})
     return _settings(rules, [({"id": "anybody"}, rules)])
 
 

@@ -68,8 +68,10 @@ class Network:
         security: str | None = None,  # folder with this robot's certificate for the router
         namespace: str = "",  # precedes all keys on the network
         on_router: Callable[[bool], None] | None = None,  # connected or lost; Zenoh's threads
+        gossip: bool = False,  # whether clients learn of each other, as ROS 2 nodes must
     ) -> None:
         settings = guard if lockstep else {**REALTIME, **guard}
+        settings = {**settings, "scouting/gossip/enabled": gossip}
         if namespace:
             settings = {**settings, "namespace": namespace}
         self.session = (

@@ -39,11 +39,18 @@ LIMITS: Mapping[str, Any] = {
 
 
 def server_security(
-    listen: Sequence[str], robots: Sequence[str], *, security: str | None, insecure: bool, namespace: str = ""
+    listen: Sequence[str],
+    robots: Sequence[str],
+    *,
+    security: str | None,
+    insecure: bool,
+    namespace: str = "",
+    ros2: bool = False,
 ) -> tuple[list[str], dict[str, Any]]:
     """Return the endpoints to listen on and the settings that protect them; StartError if one is unprotected."""
     secured, settings, roles = _security(listen, security, insecure=insecure)
-    access = open_access(robots, namespace) if roles is None else access_control(robots, roles, namespace)
+    everyone = open_access(robots, namespace, ros2=ros2)
+    access = everyone if roles is None else access_control(robots, roles, namespace)
     return secured, {**settings, "access_control": access}
 
 

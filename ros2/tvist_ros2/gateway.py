@@ -1,0 +1,127 @@
+"""A robot as a ROS 2 robot: connects the robot's states and commands with a node."""
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from functools import partial
+from typing import Any
+
+from tvist_client.arm import Arm
+from tvist_client.robot import Robot
+from tvist_protocol import Info, TvistError
+from tvist_ros2.action import TrajectoryAction
+from tvist_ros2.messages import TYPES, ros
+from tvist_ros2.mover import Mover
+from tvist_ros2.names import Qos
+from tvist_ros2.node import Node
+from tvist_ros2.outputs import RATE, Outputs
+
+CONTROLLER = "scaled_joint_trajectory_controller"  # as in UR's driver
+POSITIONS = "forward_position_controller/commands"
+REPEAT_S = 1.0  # time without a state after which the last one is published again [s]
+WARN = 30  # a level of rcl_interfaces/msg/Log
+SAME_S = 5.0  # time within which the same warning is given only once [s]
+
+DASHBOARD: dict[str, Callable[[Arm], Awaitable[None]]] = {
+    "power_on": lambda arm: arm.power_on(release_brakes=False),
+    "brake_release": lambda arm: arm.power_on(),
+    "power_off": lambda arm: arm.power_off(),
+    "unlock_protective_stop": lambda arm: arm.unlock_protective_stop(),
+    "restart_safety": lambda arm: arm.restart_safety(),
+    "play": lambda arm: arm.play_program(),
+    "pause": lambda arm: arm.pause_program(),
+    "close_popup": lambda arm: arm.close_popup(),
+}
+"""Services that need control, as UR's driver names them in `dashboard_client`; `stop` needs none."""
+
+
+class Gateway:
+    """Publishes what the robot does, and carries out what ROS 2 asks for."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        info: Info,
+        node: Node,
+        *,
+        name: str = "tvist",  # of the node, for the log
+        rate: float = RATE,  # states to publish per second of the robot's time [Hz]
+        say: Callable[[str], None] = lambda _: None,  # tells people what was refused
+    ) -> None:
+        self._robot, self._name, self._say = robot, name, say
+        self._outputs = Outputs(node, info, rate)
+        self._log = node.publisher("/rosout", TYPES["rcl_interfaces/msg/Log"], Qos(1000, latched=True))
+        self._warned = "", 0.0
+        self._moving: asyncio.Task[None] | None = None  # a trajectory of the topic that is being started
+        self._mover = Mover(robot, self._warn)
+        self._action = TrajectoryAction(
+            node, f"{CONTROLLER}/follow_joint_trajectory", self._mover, self._outputs, self._warn
+        )
+        node.subscribe(POSITIONS, TYPES["std_msgs/msg/Float64MultiArray"], self._position)
+        node.subscribe(
+            f"{CONTROLLER}/joint_trajectory", TYPES["trajectory_msgs/msg/JointTrajectory"], self._trajectory
+        )
+        trigger = TYPES["std_srvs/srv/Trigger"]
+        node.serve("dashboard_client/stop", trigger, lambda _: self._done(robot.stop()))
+        for service, command in DASHBOARD.items():
+            node.serve(f"dashboard_client/{service}", trigger, partial(self._command, command))
+
+    async def run(self) -> None:
+        """Work until the robot disconnects, which raises NotConnectedError."""
+        states = self._robot.states()
+        repeating = asyncio.create_task(self._repeat())
+        try:
+            self._outputs.take(await self._robot.state())
+            async for state in states:
+                self._outputs.take(state)
+                self._action.take(state)
+        finally:
+            repeating.cancel()
+            await self._mover.close()
+
+    async def _repeat(self) -> None:
+        """Publish the last state each second in which no state came: nodes with `use_sim_time` wait for the time."""
+        while True:
+            before = self._outputs.latest
+            await asyncio.sleep(REPEAT_S)
+            if self._outputs.latest is before:
+                self._outputs.publish()
+
+    def _position(self, message: Any) -> None:
+        given, joints = len(message.data), len(self._outputs.joints)
+        if given == joints:
+            self._mover.follow(message.data)
+        else:
+            self._warn(f"a position command has {given} numbers: must have {joints}")
+
+    def _trajectory(self, message: Any) -> None:
+        self._moving = asyncio.create_task(self._move(message))
+
+    async def _move(self, message: Any) -> None:
+        try:
+            await self._mover.begin(self._outputs.points_of(message))
+        except TvistError as error:
+            self._warn(f"a trajectory was refused: {error}")
+
+    async def _command(self, command: Callable[[Arm], Awaitable[None]], _: Any) -> Any:
+        async def controlled() -> None:
+            async with self._mover.control() as arm:
+                await command(arm)
+
+        return await self._done(controlled())
+
+    async def _done(self, doing: Awaitable[None]) -> Any:
+        """Return the answer of a service: whether it was done, or why not."""
+        try:
+            await doing
+        except TvistError as error:
+            return ros.Trigger_Response(False, str(error))
+        return ros.Trigger_Response(True, "")
+
+    def _warn(self, why: str) -> None:
+        """Tell people and `/rosout` what was refused; the same thing only once in some seconds."""
+        now = asyncio.get_running_loop().time()
+        if self._warned[0] == why and now < self._warned[1] + SAME_S:
+            return
+        self._warned = why, now
+        self._say(why)
+        self._log(ros.Log(self._outputs.now(), WARN, self._name, why))

@@ -1,0 +1,137 @@
+"""A ROS 2 node over Zenoh, which speaks the protocol of rmw_zenoh without an installed ROS 2."""
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable
+from functools import partial
+from hashlib import blake2b
+from itertools import count
+from struct import Struct
+from typing import Any
+
+import zenoh
+import zenoh.ext
+from zenoh.handlers import Callback
+
+from tvist_client.transports.inbox import wake
+from tvist_client.transports.session import close_session, open_session
+from tvist_ros2.cdr import CdrError, decode, encode
+from tvist_ros2.messages import RosType
+from tvist_ros2.names import DEFAULT, Kind, Qos, Tokens, absolute, key
+from tvist_ros2.node import Answer, Node
+
+log = logging.getLogger(__name__)
+
+ATTACHMENT = Struct("<qqB16s")
+"""Attachment of a message: its number, the time [ns], the length of the publisher's identifier, the identifier."""
+
+
+class ZenohNode(Node):
+    """A node in a session of its own, created by `open`."""
+
+    def __init__(
+        self, session: zenoh.Session, domain: int, namespace: str, name: str, *, lossless: bool
+    ) -> None:
+        self._session, self._domain, self._namespace = session, domain, namespace
+        self._tokens = Tokens(domain, str(session.info.zid()), namespace, name)
+        self._congestion = zenoh.CongestionControl.BLOCK if lossless else zenoh.CongestionControl.DROP
+        self._loop = asyncio.get_running_loop()
+        self._answering: set[asyncio.Task[None]] = set()
+        # Zenoh withdraws what is no longer referenced.
+        self._kept: list[object] = [session.liveliness().declare_token(self._tokens.node())]
+
+    @classmethod
+    async def open(
+        cls, endpoint: str, domain: int, namespace: str, name: str, *, lossless: bool = False
+    ) -> "ZenohNode":
+        """Connect to a Zenoh router; with `lossless`, publishers wait for subscribers. May raise NotConnectedError."""
+        session = await asyncio.to_thread(open_session, endpoint)
+        return cls(session, domain, namespace, name, lossless=lossless)
+
+    def publisher(self, name: str, of: RosType, qos: Qos = DEFAULT) -> Callable[[Any], None]:
+        where = self._key(name, of)
+        publisher: zenoh.Publisher | zenoh.ext.AdvancedPublisher
+        if qos.latched:
+            publisher = zenoh.ext.declare_advanced_publisher(
+                self._session,
+                where,
+                congestion_control=self._congestion,
+                cache=zenoh.ext.CacheConfig(qos.depth),
+                # Number the messages, because the session has no timestamps.
+                sample_miss_detection=zenoh.ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=None),
+                publisher_detection=True,
+            )
+        else:
+            publisher = self._session.declare_publisher(where, congestion_control=self._congestion)
+        self._kept.append(publisher)
+        token = self._announce("MP", name, of, qos)
+        numbers, identifier = count(1), blake2b(token.encode(), digest_size=16).digest()
+        return lambda message: publisher.put(
+            encode(message), attachment=_attachment(next(numbers), identifier)
+        )
+
+    def subscribe(self, name: str, of: RosType, callback: Callable[[Any], None]) -> None:
+        where = self._key(name, of)
+
+        def receive(data: bytes) -> None:
+            try:
+                message = decode(of.request, data)
+            except CdrError as error:
+                log.warning("an invalid message on %s: %s", name, error)
+            else:
+                callback(message)
+
+        def on_sample(sample: zenoh.Sample) -> None:
+            # Others may put on a key with a wildcard, which arrives here too.
+            if str(sample.key_expr) == where:
+                wake(self._loop, partial(receive, sample.payload.to_bytes()))
+
+        self._kept.append(self._session.declare_subscriber(where, Callback(on_sample, indirect=False)))
+        self._announce("MS", name, of)
+
+    def serve(self, name: str, of: RosType, answer: Answer) -> None:
+        where = self._key(name, of)
+
+        async def respond(query: zenoh.Query) -> None:
+            with query:
+                try:
+                    # The reply repeats the client's number and identifier.
+                    number, _, _, identifier = ATTACHMENT.unpack(bytes(query.attachment or b""))
+                    request = decode(of.request, bytes(query.payload or b""))
+                except ValueError as error:
+                    log.warning("an invalid request to %s: %s", name, error)
+                    return
+                response = encode(await answer(request))
+                query.reply(where, response, attachment=_attachment(number, identifier))
+
+        def begin(query: zenoh.Query) -> None:
+            task = self._loop.create_task(respond(query))
+            self._answering.add(task)
+            task.add_done_callback(self._answering.discard)
+
+        def on_query(query: zenoh.Query) -> None:
+            wake(self._loop, partial(begin, query))
+
+        self._kept.append(
+            self._session.declare_queryable(where, Callback(on_query, indirect=False), complete=True)
+        )
+        self._announce("SS", name, of)
+
+    async def close(self) -> None:
+        for task in tuple(self._answering):
+            task.cancel()
+        await asyncio.gather(*self._answering, return_exceptions=True)
+        await asyncio.to_thread(close_session, self._session)
+
+    def _key(self, name: str, of: RosType) -> str:
+        return key(self._domain, absolute(self._namespace, name), of)
+
+    def _announce(self, kind: Kind, name: str, of: RosType, qos: Qos = DEFAULT) -> str:
+        token = self._tokens.entity(kind, absolute(self._namespace, name), of, qos)
+        self._kept.append(self._session.liveliness().declare_token(token))
+        return token
+
+
+def _attachment(number: int, identifier: bytes) -> bytes:
+    return ATTACHMENT.pack(number, time.time_ns(), len(identifier), identifier)

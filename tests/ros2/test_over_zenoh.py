@@ -1,0 +1,172 @@
+"""Two nodes of our own over a Zenoh router, and `tvist serve --ros2`."""
+
+import asyncio
+import signal
+from contextlib import asynccontextmanager
+from functools import partial
+
+import pytest
+import zenoh.ext
+from tests.conformance.served import Served, finished, refused_to_start
+from tests.places import free_endpoint
+from tests.ros2.nodes import ACTION, JOINTS, stepped_robot, trajectory_of
+from zenoh.handlers import Callback
+
+from tvist_client.transports.inbox import wake
+from tvist_client.transports.session import close_session, open_session
+from tvist_ros2.cdr import decode, encode
+from tvist_ros2.messages import TYPES, ros
+from tvist_ros2.names import key
+from tvist_ros2.zenoh_node import ATTACHMENT, ZenohNode
+from tvist_server.gateways.network import Network
+
+SEND_GOAL, GET_RESULT, TRIGGER = (
+    TYPES[name]
+    for name in (
+        "control_msgs/action/FollowJointTrajectory_SendGoal",
+        "control_msgs/action/FollowJointTrajectory_GetResult",
+        "std_srvs/srv/Trigger",
+    )
+)
+IDENTIFIER = bytes(range(16))
+
+
+class Peer:
+    """What a node of rmw_zenoh does: it subscribes, calls services and looks for tokens."""
+
+    def __init__(self, endpoint):
+        self.session, self.loop = open_session(endpoint), asyncio.get_running_loop()
+        self.kept = []
+
+    def topic(self, name, of):
+        """Return a queue of the messages and attachments of a topic, also of those sent before if it is latched."""
+        queue = asyncio.Queue()
+
+        def on_sample(sample):
+            item = decode(of.request, bytes(sample.payload)), ATTACHMENT.unpack(bytes(sample.attachment))
+            wake(self.loop, partial(queue.put_nowait, item))
+
+        history = zenoh.ext.HistoryConfig(detect_late_publishers=True)
+        callback = Callback(on_sample, indirect=False)
+        where = key(0, name, of)
+        self.kept.append(
+            zenoh.ext.declare_advanced_subscriber(self.session, where, callback, history=history)
+        )
+        return queue
+
+    async def call(self, name, of, request):
+        """Call a service."""
+        answer = self.loop.create_future()
+
+        def on_reply(reply):
+            wake(self.loop, partial(answer.set_result, (bytes(reply.ok.payload), bytes(reply.ok.attachment))))
+
+        attachment = ATTACHMENT.pack(7, 0, 16, IDENTIFIER)
+        where, callback = key(0, name, of), Callback(on_reply, indirect=False)
+        self.session.get(where, callback, payload=encode(request), attachment=attachment, timeout=60)
+        payload, told = await answer
+        number, _, size, identifier = ATTACHMENT.unpack(told)
+        assert (number, size, identifier) == (7, 16, IDENTIFIER)
+        return decode(of.response, payload)
+
+    def tokens(self):
+        replies = self.session.liveliness().get("@ros2_lv/**", timeout=5)
+        return {str(reply.ok.key_expr) for reply in replies}
+
+
+@asynccontextmanager
+async def over_zenoh():
+    """Run a robot in lockstep with its node at a router, and a peer there."""
+    endpoint = free_endpoint()
+    network = Network([endpoint], gossip=True)
+    node = await ZenohNode.open(endpoint, 0, "", "tvist_ur5e", lossless=True)
+    peer = Peer(endpoint)
+    try:
+        async with stepped_robot(node, calibration="none", shaper="none") as robot:
+            yield robot, peer
+    finally:
+        close_session(peer.session)
+        await node.close()
+        network.close()
+
+
+async def moved():
+    """Move the robot by the action; return all joint states as they came."""
+    async with over_zenoh() as (robot, peer):
+        states = peer.topic("/joint_states", TYPES["sensor_msgs/msg/JointState"])
+        uuid, q = ros.UUID(b"goal" * 4), robot.q
+        points = [(0.5, [q[0] + 0.1, *q[1:]], [0.0] * 6)]
+        goal = ros.FollowJointTrajectory_Goal(trajectory_of(points))
+        request = ros.FollowJointTrajectory_SendGoal_Request(uuid, goal)
+        assert (await peer.call(f"/{ACTION}/send_goal", SEND_GOAL, request)).accepted
+        asked = ros.FollowJointTrajectory_GetResult_Request(uuid)
+        result = asyncio.create_task(peer.call(f"/{ACTION}/get_result", GET_RESULT, asked))
+        await robot.step(400)
+        assert (await result).result.error_code == 0
+        received = [await states.get() for _ in range(400)]
+        numbers = [attached[0] for _, attached in received]
+        assert numbers == list(range(numbers[0], numbers[0] + 400))
+        assert len({attached[3] for _, attached in received}) == 1
+        assert received[-1][0].name == JOINTS
+        return [encode(message) for message, _ in received[-400:]]
+
+
+async def test_two_nodes_move_the_robot_and_repeat_it_to_the_last_bit():
+    assert await moved() == await moved()
+
+
+async def test_late_node_gets_what_is_latched_and_sees_every_entity():
+    async with over_zenoh() as (robot, peer):
+        await robot.step(10)
+        description = peer.topic("/robot_description", TYPES["std_msgs/msg/String"])
+        assert "shoulder_pan_joint" in (await description.get())[0].data
+        answer = await peer.call("/dashboard_client/stop", TRIGGER, ros.Trigger_Request())
+        assert answer.success
+        kinds = [token.split("/")[5] for token in peer.tokens()]
+        assert [kinds.count(kind) for kind in ("NN", "SS", "MS")] == [1, 12, 2]
+
+
+async def test_states_and_time_are_repeated_while_time_stands_still(monkeypatch):
+    monkeypatch.setattr("tvist_ros2.gateway.REPEAT_S", 0.01)
+    async with over_zenoh() as (_, peer):
+        clock = peer.topic("/clock", TYPES["rosgraph_msgs/msg/Clock"])
+        first, second = (await clock.get())[0], (await clock.get())[0]
+        assert first == second
+
+
+@pytest.mark.realtime
+async def test_served_robot_is_a_ros_2_robot():
+    with Served("--ros2") as served:
+        served.wait_until_said("is in ROS 2, domain 0")
+        peer = Peer(served.endpoint)
+        try:
+            states = peer.topic("/joint_states", TYPES["sensor_msgs/msg/JointState"])
+            assert (await states.get())[0].name == JOINTS
+            assert (await peer.call("/dashboard_client/stop", TRIGGER, ros.Trigger_Request())).success
+        finally:
+            close_session(peer.session)
+        assert served.end(signal.SIGINT) == 0
+
+
+@pytest.mark.parametrize(
+    ("options", "why"),
+    [
+        (("--security", "keys"), "every ROS 2 node can move the robot"),
+        (("--robots", "ur5e*2", "--clock", "lockstep"), "needs one time for all robots"),
+        (("--robots", "ur5e*2", "--workers", "2"), "run tvist ros2 for each robot"),
+    ],
+)
+def test_ros2_refuses_what_it_cannot_keep(options, why):
+    code, said = refused_to_start("--ros2", *options)
+    assert code == 2
+    assert why in said
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "why"),
+    [("--security", "keys", "any node may move"), ("--namespace", "a*", "must be words")],
+)
+def test_gateway_refuses_what_it_cannot_keep(option, value, why):
+    ended = finished("-m", "tvist_cli", "ros2", option, value)
+    assert ended.returncode == 2
+    assert why in ended.stderr
