@@ -72,6 +72,16 @@ def test_identify_finds_the_same_over_the_network_as_in_process(lockstep, tmp_pa
         assert there["value"] == pytest.approx(here["value"], rel=0.02)
 
 
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", ["ur10e", "ur20", "ur30"])
+def test_arm_whose_weight_takes_most_torque_in_its_first_pose_is_identified(name, identified, tmp_path):
+    said = identified("--robot", name, "--ring-downs", 6, "--output", tmp_path / "mine.json")
+    assert said["used"] == 6
+    assert said["error_f_d_percent"] < 3.0
+    weighed = identified("--robot", name, "--payload")
+    assert weighed["mass_kg"] == pytest.approx(load(name).payload.mass, rel=0.02)
+
+
 def test_payload_is_identified(identified):
     said = identified("--payload")
     assert said["mass_kg"] == said["set_payload"]["mass"] == pytest.approx(5.0, abs=0.05)

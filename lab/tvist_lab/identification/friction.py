@@ -19,7 +19,7 @@ from tvist_client.robot import Robot
 from tvist_controller.api.line import MotionLimits
 from tvist_lab.collect import collect
 from tvist_lab.identification.ring_downs import IdentificationError
-from tvist_lab.identification.travel import reach, unless_collision
+from tvist_lab.identification.travel import Travel, unless_collision
 from tvist_lab.identification.unknowns import Unknown, parameter
 from tvist_lab.metrics import motions
 from tvist_lab.metrics.ring_down import widening
@@ -58,7 +58,7 @@ async def identify_friction(
     robot: Robot, control: Arm, description: RobotDescription, places: Sequence[Floats]
 ) -> tuple[ModalParameter, ...]:
     """Move all joints slowly there and back, and fit the friction of each."""
-    speed, torque = there_and_back(await _sweep(robot, control, places))
+    speed, torque = there_and_back(await _sweep(robot, control, description, places))
     return tuple(
         parameter
         for joint, unknown in enumerate(unknown_friction(description))
@@ -66,12 +66,15 @@ async def identify_friction(
     )
 
 
-async def _sweep(robot: Robot, control: Arm, places: Sequence[Floats]) -> Recording:
+async def _sweep(
+    robot: Robot, control: Arm, description: RobotDescription, places: Sequence[Floats]
+) -> Recording:
     """Record the way there and back around the first of `places` where the way is free of collision."""
-    period = 1.0 / (await robot.info()).rate_hz
+    info = await robot.info()
+    period, travel = 1.0 / info.rate_hz, Travel(robot, control, description, info.payload)
     for middle in places[:PLACES]:
         for side in (0.5 * LENGTH, -0.5 * LENGTH):
-            if await unless_collision(reach(control, middle - side)) is None:
+            if await unless_collision(travel.reach(middle - side)) is None:
                 continue
             with collect(robot) as collected:
                 await robot.advance(round(REST / period))

@@ -17,12 +17,10 @@ from tvist_client.arm import Arm
 from tvist_client.errors import ClientError
 from tvist_client.robot import Robot
 from tvist_controller.api.line import (
-    REBOUND,
     CollisionModel,
     InverseDynamics,
     JointLine,
     MotionLimits,
-    acceleration_on_way,
     body,
     quickest_motion,
 )
@@ -38,7 +36,7 @@ from tvist_lab.identification.ring_downs import (
     stops_of,
 )
 from tvist_lab.identification.servo_response import ServoResponse, servo_response
-from tvist_lab.identification.travel import unless_collision
+from tvist_lab.identification.travel import WAYS, Travel, quickness, slower, unless_collision
 from tvist_lab.identification.unknowns import ArmModes
 from tvist_lab.recordings import Floats, Recording
 from tvist_plant.description import RobotDescription
@@ -60,7 +58,6 @@ LOUD, LATER = 0.15, 0.1
 """Desired rms acceleration per axis, as after a program's motion [m/s²], and its time after the stop [s]."""
 INEXACT, STICKING = 0.03, 0.2  # share of a ring-down that no model explains [-], normally and if motors stick
 STICKS = 1.5  # ratio of breakaway to moving friction above which a motor counts as sticking [-]
-WAYS = MotionLimits(velocity=1.5, acceleration=2.0, jerk=100.0)  # limits of the ways to the jogs
 GENTLE = 1.0  # acceleration on the ways of a robot that takes only positions [rad/s²]
 TURN, TURNS = 0.1, 2  # angle of the turns of the last joint that find the lag [rad], and their number
 UNKNOWN = 0.15  # time after the stop that is ignored if the lag is unknown [s]
@@ -198,25 +195,12 @@ def plan_ways(
                 break
             start = q - jog_of(joints)
             way = next((w for w in ((start,), (upright, start)) if is_free(collisions, here, *w, q)), None)
-            quickness = _quickness(dynamics, start, q, torque)
-            if way is not None and quickness >= GENTLEST:
-                found.append(Jog(payload, way, q, slower(LIMITS, quickness)))
+            # If a drive saturated, the ring-down would not be free vibration.
+            share = quickness(dynamics, start, q, LIMITS, torque)
+            if way is not None and share >= GENTLEST:
+                found.append(Jog(payload, way, q, slower(LIMITS, share)))
                 here = q
     return found
-
-
-def slower(limits: MotionLimits, quickness: float) -> MotionLimits:
-    """Return the limits with which a motion takes 1 / quickness times as long."""
-    return MotionLimits(
-        quickness * limits.velocity, quickness**2 * limits.acceleration, quickness**3 * limits.jerk
-    )
-
-
-def _quickness(dynamics: InverseDynamics, start: Floats, end: Floats, torque: Floats) -> float:
-    """Return the largest `quickness` of a jog, up to 1, with which jog and ring-down keep torque limits."""
-    # If a drive saturated, the ring-down would not be free vibration.
-    room = acceleration_on_way(dynamics, JointLine(start, end), start, end - start, LIMITS.velocity, torque)
-    return min(1.0, float(np.sqrt(room / (1.0 + REBOUND) / LIMITS.acceleration)))
 
 
 def is_free(collisions: CollisionModel, *postures: Floats) -> bool:
@@ -279,7 +263,8 @@ async def _jogs(
         if plan.changed and payload != carried:
             await _carry(control, payload)
             carried = payload
-        recording = await unless_collision(_jogged(robot, control, jog, plan.ways, share))
+        travel = Travel(robot, control, plan.arm.description, payload)
+        recording = await unless_collision(_jogged(robot, control, travel, jog, plan.ways, share))
         if recording is None:
             continue
         logs.append(Log(f"jog {number}", replace(recording, info=info), payload, begins, inexact, driven))
@@ -289,9 +274,11 @@ async def _jogs(
     return logs
 
 
-async def _jogged(robot: Robot, control: Arm, jog: Jog, ways: MotionLimits, share: float) -> Recording:
+async def _jogged(
+    robot: Robot, control: Arm, travel: Travel, jog: Jog, ways: MotionLimits, share: float
+) -> Recording:
     for posture in jog.way:
-        await control.move_j(posture, **asdict(ways))
+        await travel.move(posture, ways)
     return await _recorded(robot, control, jog.q, slower(jog.limits, share))
 
 

@@ -10,7 +10,7 @@ quantities determine the torques beyond gravity; friction and rotors are estimat
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
@@ -21,7 +21,7 @@ from tvist_controller.api.line import CollisionModel, body, paper_payload
 from tvist_lab.collect import collect
 from tvist_lab.identification.design import most_informative
 from tvist_lab.identification.ring_downs import IdentificationError, Progress, check_model
-from tvist_lab.identification.travel import reach, unless_collision
+from tvist_lab.identification.travel import WAYS, Travel, unless_collision
 from tvist_lab.identification.unknowns import ball, heavier
 from tvist_lab.recordings import Floats, Recording
 from tvist_lab.workspace import workspace
@@ -71,11 +71,13 @@ async def identify_payload(
         )
     arm = _Regressor(description)
     period = 1.0 / info.rate_hz
+    payloads = (info.payload, paper_payload(description, description.limits.payload))
+    travel = Travel(robot, control, description, max(payloads, key=lambda payload: payload.mass))
     rows, torques, rested = [], [], list[Floats]()
-    for q in arm.choose(_free(description, info.payload, seed), 3 * POSES):
+    for q in arm.choose(_free(description, payloads, seed), 3 * POSES):
         if len(rested) == POSES:
             break
-        held = await unless_collision(_hold(robot, control, q, period))
+        held = await unless_collision(_hold(robot, travel, q, period))
         if held is None:
             continue
         at, torque = held
@@ -91,7 +93,7 @@ async def identify_payload(
     found, deviations = arm.solve(matrix, np.concatenate(torques))
     deviations = np.hypot(deviations, arm.of_masses(matrix, rested))
     progress("a short motion")
-    in_motion, in_motion_deviation = arm.move(await _swing(robot, control, q, period))
+    in_motion, in_motion_deviation = arm.move(await _swing(robot, travel, q, period))
     mass = max(float(found[0]), 0.0)
     apart = abs(in_motion - mass)
     if apart > DISAGREEMENT[0] + DISAGREEMENT[1] * math.hypot(deviations[0], in_motion_deviation):
@@ -206,13 +208,10 @@ def _least_squares(matrix: Floats, right: Floats) -> tuple[Floats, Floats]:
     return np.asarray(found), np.asarray(np.sqrt(np.diag(np.linalg.pinv(matrix.T @ matrix)) * variance))
 
 
-def _free(description: RobotDescription, declared: Payload, seed: int) -> list[Floats]:
-    """Return poses with varied wrists that are free of collision with any payload up to the rated one."""
+def _free(description: RobotDescription, payloads: Sequence[Payload], seed: int) -> list[Floats]:
+    """Return poses with varied wrists that are free of collision with every payload."""
     joints = description.joints
-    models = [
-        CollisionModel(description, body(payload))
-        for payload in (declared, paper_payload(description, description.limits.payload))
-    ]
+    models = [CollisionModel(description, body(payload)) for payload in payloads]
     rng = np.random.default_rng(seed)
     found: list[Floats] = []
     for q in workspace(description, ASIDE).random(20 * CANDIDATES, joints, seed):
@@ -225,12 +224,12 @@ def _free(description: RobotDescription, declared: Payload, seed: int) -> list[F
     return found
 
 
-async def _hold(robot: Robot, control: Arm, q: Floats, period: float) -> tuple[Floats, Floats]:
+async def _hold(robot: Robot, travel: Travel, q: Floats, period: float) -> tuple[Floats, Floats]:
     """Return angles and torques at rest in a pose, averaged over approaches from both sides."""
     rested = []
     for side in (-1.0, 1.0):
-        await reach(control, q + side * ASIDE)
-        await control.move_j(q, acceleration=1.0)
+        await travel.reach(q + side * ASIDE)
+        await travel.move(q, replace(WAYS, acceleration=1.0))
         await robot.advance(round(REST / period))
         with collect(robot) as collected:
             await robot.advance(round(LOOK / period))
@@ -240,15 +239,15 @@ async def _hold(robot: Robot, control: Arm, q: Floats, period: float) -> tuple[F
     return angles, torques
 
 
-async def _swing(robot: Robot, control: Arm, q: Floats, period: float) -> Recording:
+async def _swing(robot: Robot, travel: Travel, q: Floats, period: float) -> Recording:
     """Move there and back on a collision-free straight line, and record the motion."""
     swing = np.zeros_like(q)
     swing[1:4] = SWING
     for share in (1.0, 0.5, 0.25, -0.25, -0.5):
         with collect(robot) as collected:
-            if await unless_collision(control.move_j(q + share * swing)) is None:
+            if await unless_collision(travel.move(q + share * swing)) is None:
                 continue
-            await control.move_j(q)
+            await travel.move(q)
             await robot.advance(round(LOOK / period))
         return collected.recording()
     raise IdentificationError("no short motion is free of collisions: give the arm more room")
