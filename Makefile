@@ -58,6 +58,7 @@ lint: setup
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/python -m tests.durations
 
 # Calls that another system does not have: everything runs on macOS, and what a client needs on Windows, too.
 elsewhere: setup

@@ -100,7 +100,7 @@ def test_the_first_move_after_rest_causes_no_payload_warning(mass, acceleration)
 
 
 POLYNOMIAL = load("ur5e_5kg")
-NAMES = ("auto", "short", "auto-target", "elastic-auto")
+NAMES = ("auto", "auto-target", "elastic-auto")
 
 
 def ringing(robot: Robot) -> float:
