@@ -45,9 +45,9 @@ def run(
     do not pause it: they are printed and closed. With --lockstep, several programs run one after the other,
     each on a new robot.
 
-    With --check, nothing runs. An error is anything that keeps a program from starting: wrong syntax, unknown
-    names, and calls with wrong arguments. A UR function that tvist does not simulate is a warning: the
-    program starts, and ends with an error when it calls that function.
+    With --check, nothing runs. An error is anything that keeps a program from starting: wrong syntax or an
+    unknown name. A call that can only fail, since its arguments do not fit or tvist does not simulate the
+    function, is a warning: the program ends when it reaches it.
 
     Args:
         file: Run this program, URScript or a .urp file that PolyScope saved; with --lockstep or --check these
