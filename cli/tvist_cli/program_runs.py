@@ -60,6 +60,17 @@ def read_script(file: Path, choices: Choices = NONE) -> str:
             raise Misuse(str(error)) from error
 
 
+def answers_of(given: Sequence[str]) -> dict[str, str]:
+    """Return the values of --answer by their names."""
+    answers: dict[str, str] = {}
+    for one in given:
+        name, equals, value = one.partition("=")
+        if not equals or name in answers:
+            raise Misuse(f"answer is {one!r}: give NAME=VALUE, and each NAME once")
+        answers[name] = value
+    return answers
+
+
 def programs_in(files: Sequence[Path]) -> list[Path]:
     """Replace folders by their programs, without scripts that PolyScope exported beside programs it saved."""
     found: list[Path] = []
@@ -73,7 +84,10 @@ def programs_in(files: Sequence[Path]) -> list[Path]:
 
 
 def read_scripts(files: Sequence[Path], choices: Choices) -> list[str | Failure]:
-    """Read programs. If there are several, return the Failure of each unreadable one, so others can run."""
+    """Read programs. If there are several, return the Failure of each unreadable one, so others can run.
+
+    Raise Misuse if they were all read, but an answer was not used.
+    """
     found: list[str | Failure] = []
     for file in files:
         try:
@@ -82,13 +96,18 @@ def read_scripts(files: Sequence[Path], choices: Choices) -> list[str | Failure]
             if len(files) == 1:
                 raise
             found.append(error)
+    unused = ", ".join(sorted(choices.answers.keys() - choices.used))
+    if unused and not any(isinstance(one, Failure) for one in found):
+        raise Misuse(f"no question needs --answer {unused}: leave it out")
     return found
 
 
 def print_scripts(files: Sequence[Path], choices: Choices) -> None:
     """Print programs as URScript."""
-    for file in programs_in(files):
-        print(read_script(file, choices), end="")
+    for text in read_scripts(programs_in(files), choices):
+        if isinstance(text, Failure):
+            raise text
+        print(text, end="")
 
 
 def placed(file: Path, finding: ProgramFinding) -> str:
@@ -104,11 +123,7 @@ def check_scripts(files: Sequence[Path], choices: Choices, *, json: bool) -> Non
     found = [(one, finding) for one, text in texts for finding in _findings(text)]
     errors = sum(finding.level == "error" for _, finding in found)
     if json:
-        findings = [
-            {"file": named(one), "line": finding.line, "column": finding.column, "level": finding.level,
-             "text": finding.text}
-            for one, finding in found
-        ]  # fmt: skip
+        findings = [{"file": named(one)} | asdict(finding) for one, finding in found]
         print_json({"ok": errors == 0, "files": len(files), "errors": errors, "findings": findings})
     else:
         for one, finding in found:

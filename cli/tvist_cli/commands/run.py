@@ -73,12 +73,11 @@ def run(
         json: Print one JSON object at the end instead of messages; for several programs it contains a list.
         given: Fields of `ServeConfig`.
     """
-    from tvist_cli.program_runs import check_scripts, print_scripts
+    from tvist_cli.program_runs import answers_of, check_scripts, print_scripts
     from tvist_cli.running import run_programs
     from tvist_server.polyscope.nodes import Choices
 
-    answers = {name: value for name, _, value in (one.partition("=") for one in answer or ())}
-    choices = Choices(frozenset(skip or ()), answers)
+    choices = Choices(frozenset(skip or ()), answers_of(answer or ()))
     runs = any((given, lockstep, inputs, config, timeout is not None, limits != NO_LIMITS, junit, baseline))
     if translate:
         if runs or check or json:

@@ -5,6 +5,10 @@ from contextlib import contextmanager
 from types import MappingProxyType
 from xml.etree.ElementTree import Element
 
+from tvist_protocol.errors import short
+
+_LONGEST = 250  # longest title of a label [characters]: fewer bytes than a text may have
+
 
 class ScriptText:
     """Lines of URScript."""
@@ -22,7 +26,7 @@ class ScriptText:
     def label(self, node: Element, title: str, *lines: str) -> None:
         """Add the label of a node, then lines."""
         plain = "".join(c for c in title.replace('"', "'") if c.isprintable())
-        self.line(f'$ {self.numbers[node]} "{plain}"', *lines)
+        self.line(f'$ {self.numbers[node]} "{short(plain, _LONGEST)}"', *lines)
 
     @contextmanager
     def block(self, head: str, end: str = "end") -> Iterator[None]:
