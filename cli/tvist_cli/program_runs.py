@@ -22,7 +22,7 @@ from tvist_lab.programs.watch import ProgramMessage, ProgramWatch
 from tvist_plant.user_file import LARGEST, UserFileError
 from tvist_protocol.errors import harmless
 from tvist_server.config import ServeConfig
-from tvist_server.polyscope.files import read_program
+from tvist_server.polyscope.files import read_program, text_of
 from tvist_server.polyscope.nodes import NONE, Choices
 from tvist_server.program_folder import SCRIPT, URP
 from tvist_server.server import Server
@@ -43,19 +43,14 @@ def _is_stdin(file: Path) -> bool:
 
 def read_script(file: Path, choices: Choices = NONE) -> str:
     """Read a program; `-` reads the standard input."""
-    if _is_stdin(file):
-        content = sys.stdin.buffer.read(LARGEST + 1)
-        if len(content) > LARGEST:
-            raise Misuse(f"the standard input has more than {LARGEST >> 20} MiB: give a smaller program")
-        try:
-            return content.decode()
-        except UnicodeDecodeError as error:
-            raise Misuse(
-                f"the standard input is not text in UTF-8 ({error.reason} at byte {error.start})"
-            ) from error
     with failing_on(OSError, exit_code=2):
         try:
-            return read_program(file, choices)
+            if not _is_stdin(file):
+                return read_program(file, choices)
+            content = sys.stdin.buffer.read(LARGEST + 1)
+            if len(content) > LARGEST:
+                raise Misuse(f"the standard input has more than {LARGEST >> 20} MiB: give a smaller program")
+            return text_of(Path(named(file)), content, choices)
         except UserFileError as error:
             raise Misuse(str(error)) from error
 
@@ -84,10 +79,7 @@ def programs_in(files: Sequence[Path]) -> list[Path]:
 
 
 def read_scripts(files: Sequence[Path], choices: Choices) -> list[str | Failure]:
-    """Read programs. If there are several, return the Failure of each unreadable one, so others can run.
-
-    Raise Misuse if they were all read, but an answer was not used.
-    """
+    """Read programs. If there are several, return the Failure of each unreadable one, so others can run."""
     found: list[str | Failure] = []
     for file in files:
         try:

@@ -100,7 +100,9 @@ class Expressions:
     def _pin(self, node: Element | None, functions: dict[str, str]) -> tuple[str, str, str]:
         target = self._references.target(node)
         name = "" if target is None else target.get("referencedName") or ""
-        words = _PIN.fullmatch(self._installation.pin(name))
+        pins = self._installation.pins
+        words = _PIN.fullmatch(pins.get(name, name))
         if words is None or words[1] not in functions:
             raise UnknownPartError(f"the signal {name or 'without a name'}")
-        return functions[words[1]], words[2], self._installation.shown(words[0])
+        shown = next((one for one, pin in pins.items() if pin == words[0]), words[0])
+        return functions[words[1]], words[2], shown

@@ -60,22 +60,13 @@ class Installation:
         pins |= {one.get("name") or "": f'modbus["{one.get("name")}"]' for one in tree.iter("ModbusSignal")}
         features = {
             one.get("name") or "": numbers(place.get("value"), 3) + numbers(turn.get("value"), 3)
-            for one in tree.iter("GeomPoseNode")
-            if one.get("isVariable") == "true"
-            and (place := one.find("toolPosition")) is not None
+            for one in tree.iterfind(".//GeomPoseNode[@isVariable='true']")
+            if (place := one.find("toolPosition")) is not None
             and (turn := one.find("toolAxisAngle")) is not None
         }
-        home = tree.find("SafeHomeSettings")
-        at = None if home is None or home.get("enabled") != "true" else numbers(home.get("position"), 6)
+        home = tree.find("SafeHomeSettings[@enabled='true']")
+        at = None if home is None else numbers(home.get("position"), 6)
         return cls(tcps, active, pins, features, variables, at)
-
-    def pin(self, name: str) -> str:
-        """Return the signal with a name of the installation, or the name itself."""
-        return self.pins.get(name, name)
-
-    def shown(self, pin: str) -> str:
-        """Return the installation's name of a signal, or the signal itself."""
-        return next((name for name, signal in self.pins.items() if signal == pin), pin)
 
     def start(self) -> list[str]:
         """Return the lines of URScript with which PolyScope begins a program."""

@@ -308,8 +308,7 @@ class Nodes:
             _refuse(node)
         name, frame = self.moves.feature(node.find("feature"))
         chosen = [int(axis) for axis in parts["selection"]]
-        by_axis = ("limitsForce" if axis else "limitsMotion" for axis in chosen)
-        limits = [parts[name][axis] for axis, name in enumerate(by_axis)]
+        limits = [parts["limitsForce" if on else "limitsMotion"][axis] for axis, on in enumerate(chosen)]
         frame = "tool_pose()" if name == "Tool" else frame
         call = f"force_mode({frame}, {chosen}, {list(parts['wrench'])}, 2, {limits})"
         self._forced(node, "Force", "sleep(0.02)", "zero_ftsensor()", call)

@@ -7,8 +7,6 @@ from xml.etree.ElementTree import Element
 
 from tvist_protocol.errors import short
 
-_LONGEST = 250  # longest title of a label [characters]: fewer bytes than a text may have
-
 
 class ScriptText:
     """Lines of URScript."""
@@ -26,7 +24,8 @@ class ScriptText:
     def label(self, node: Element, title: str, *lines: str) -> None:
         """Add the label of a node, then lines."""
         plain = "".join(c for c in title.replace('"', "'") if c.isprintable())
-        self.line(f'$ {self.numbers[node]} "{short(plain, _LONGEST)}"', *lines)
+        plain = short(plain, 250)  # has fewer bytes than a text may have
+        self.line(f'$ {self.numbers[node]} "{plain}"', *lines)
 
     @contextmanager
     def block(self, head: str, end: str = "end") -> Iterator[None]:
