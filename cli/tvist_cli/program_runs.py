@@ -22,7 +22,7 @@ from tvist_lab.programs.watch import ProgramMessage, ProgramWatch
 from tvist_plant.user_file import LARGEST, UserFileError
 from tvist_protocol.errors import harmless
 from tvist_server.config import ServeConfig
-from tvist_server.polyscope.files import read_program
+from tvist_server.polyscope.files import read_program, text_of
 from tvist_server.polyscope.nodes import NONE, Choices
 from tvist_server.program_folder import SCRIPT, URP
 from tvist_server.server import Server
@@ -43,21 +43,27 @@ def _is_stdin(file: Path) -> bool:
 
 def read_script(file: Path, choices: Choices = NONE) -> str:
     """Read a program; `-` reads the standard input."""
-    if _is_stdin(file):
-        content = sys.stdin.buffer.read(LARGEST + 1)
-        if len(content) > LARGEST:
-            raise Misuse(f"the standard input has more than {LARGEST >> 20} MiB: give a smaller program")
-        try:
-            return content.decode()
-        except UnicodeDecodeError as error:
-            raise Misuse(
-                f"the standard input is not text in UTF-8 ({error.reason} at byte {error.start})"
-            ) from error
     with failing_on(OSError, exit_code=2):
         try:
-            return read_program(file, choices)
+            if not _is_stdin(file):
+                return read_program(file, choices)
+            content = sys.stdin.buffer.read(LARGEST + 1)
+            if len(content) > LARGEST:
+                raise Misuse(f"the standard input has more than {LARGEST >> 20} MiB: give a smaller program")
+            return text_of(Path(named(file)), content, choices)
         except UserFileError as error:
             raise Misuse(str(error)) from error
+
+
+def answers_of(given: Sequence[str]) -> dict[str, str]:
+    """Return the values of --answer by their names."""
+    answers: dict[str, str] = {}
+    for one in given:
+        name, equals, value = one.partition("=")
+        if not equals or name in answers:
+            raise Misuse(f"answer is {one!r}: give NAME=VALUE, and each NAME once")
+        answers[name] = value
+    return answers
 
 
 def programs_in(files: Sequence[Path]) -> list[Path]:
@@ -82,13 +88,18 @@ def read_scripts(files: Sequence[Path], choices: Choices) -> list[str | Failure]
             if len(files) == 1:
                 raise
             found.append(error)
+    unused = ", ".join(sorted(choices.answers.keys() - choices.used))
+    if unused and not any(isinstance(one, Failure) for one in found):
+        raise Misuse(f"no question needs --answer {unused}: leave it out")
     return found
 
 
 def print_scripts(files: Sequence[Path], choices: Choices) -> None:
     """Print programs as URScript."""
-    for file in programs_in(files):
-        print(read_script(file, choices), end="")
+    for text in read_scripts(programs_in(files), choices):
+        if isinstance(text, Failure):
+            raise text
+        print(text, end="")
 
 
 def placed(file: Path, finding: ProgramFinding) -> str:
@@ -104,11 +115,7 @@ def check_scripts(files: Sequence[Path], choices: Choices, *, json: bool) -> Non
     found = [(one, finding) for one, text in texts for finding in _findings(text)]
     errors = sum(finding.level == "error" for _, finding in found)
     if json:
-        findings = [
-            {"file": named(one), "line": finding.line, "column": finding.column, "level": finding.level,
-             "text": finding.text}
-            for one, finding in found
-        ]  # fmt: skip
+        findings = [{"file": named(one)} | asdict(finding) for one, finding in found]
         print_json({"ok": errors == 0, "files": len(files), "errors": errors, "findings": findings})
     else:
         for one, finding in found:

@@ -22,7 +22,7 @@ GRIPPER = "com.robotiq.urcap.gripper."
 DIRECTION = "gui.program.direction.MoveDirectionNode"
 PARTS = (
     "<ExpressionToken token=' not '/>", "<ExpressionIO><pin referencedName='digital_in[2]'/></ExpressionIO>", "≠",
-    "<ExpressionVariable><ProgramVariable name='x'/></ExpressionVariable>",
+    "<ExpressionVariable><ProgramVariable name='x'/></ExpressionVariable>", "<ExpressionChar character='&#10;'/>",
 )  # fmt: skip
 BRANCHES = "".join(
     f"<If type='{kind}'>{expression(condition)}<children/></If>"
@@ -80,10 +80,10 @@ def lines(tmp_path):
          ['$ 2 "x≔7"', "global x=7",
           '$ 3 "Popup"', 'popup(str_cat("", x), "Message", False, False, blocking=True)']),
         ("<Popup type='Error' message='no part' haltProgram='true'/>",
-         ['$ 2 "Popup: no part"', 'popup("no part", "Error", False, True, blocking=True)', "halt"]),
+         ['$ 2 "Popup: no part"', 'popup("no part", "Error", False, True, blocking=False)', "halt"]),
         (f"<Assignment><variable name='x'/>{expression('1≟2')}</Assignment>", ['$ 2 "x≔1≟2"', "global x=1 == 2"]),
         (f"<Assignment><variable name='x'/>{expression(*PARTS)}</Assignment>",
-         ['$ 2 "x≔ not digital_in[2]≠x"', "global x=  not  get_standard_digital_in(2) != x"]),
+         ['$ 2 "x≔ not digital_in[2]≠x "', "global x=  not  get_standard_digital_in(2) != x"]),
         (f"<Assignment><variable name='Größe'/>{expression('1')}</Assignment>",
          ['$ 2 "Gru246u223e≔1"', "global Gru246u223e=1"]),
         ("<Loop type='Counting' count='3'><loopVariable name='i'/><children><Halt/></children></Loop>",
@@ -113,8 +113,8 @@ def lines(tmp_path):
           "end_freedrive_mode()"]),
         ("<Set type='DigitalOutput'><pin referencedName='tool_out[0]'/><digitalValue>1</digitalValue></Set>",
          ['$ 2 "Set TO[0]=On"', "set_tool_digital_out(0, True)"]),
-        (f"<Switch>{expression('2')}<children><Case caseValue='1'/><Case caseValue='2147483647'/></children></Switch>",
-         ['$ 2 "Switch 2"', "switch_1 = 2", '$ 3 "Case 1"', "if (1 == switch_1):", "else:", '$ 4 "Default Case"',
+        (f"<Switch>{expression('2')}<children><Case caseValue='2147483647'/><Case caseValue='1'/></children></Switch>",
+         ['$ 2 "Switch 2"', "switch_1 = 2", '$ 4 "Case 1"', "if (1 == switch_1):", "else:", '$ 3 "Default Case"',
           "end"]),
         (contributed(f"{GRIPPER}GripperNode", "Gripper", positionInDouble=50.0, speedInDouble=30.0, forceInDouble=0.0),
          ['$ 2 "Gripper"', "rq_set_pos(128)", "rq_set_speed(77)", "rq_set_force(0)", "rq_go_to()", "rq_wait()"]),
@@ -132,6 +132,11 @@ def lines(tmp_path):
 )  # fmt: skip
 def test_a_node_is_translated_to_the_script_that_polyscope_writes(lines, node, script):
     assert lines(node) == ['$ 1 "Robot Program"', *script]
+
+
+def test_a_label_is_no_longer_than_a_text_may_be(lines):
+    [label] = lines(f"<Comment comment='{'ö' * 600}'/>")[1:]
+    assert 200 < len(label.encode()) < 1023
 
 
 BOTH = "<motionParameters jointSpeed='0.3' cartesianSpeed='0.1'/>"
@@ -175,6 +180,8 @@ def test_a_taught_waypoint_becomes_a_pose_and_a_posture_near_it(lines):
         (move(waypoint("A", Q), kind="MoveP", blendRadius=0.02) + "<Halt/>", "movep(A_q, a=2.0, v=1.5, r=0.02)"),
         (move(waypoint("A", Q), kind="MoveP", blendRadius=0.02) + "<SuppressedNode/>" + move(waypoint("B", Q)),
          "movep(A_q, a=2.0, v=1.5, r=0.02)"),
+        (move(waypoint("A", Q), kind="MoveP", blendRadius=0.02)
+         + move(f"<{DIRECTION} selectedDirection='ZMinus'/>", kind="MoveL"), "movep(A_q, a=2.0, v=1.5, r=0.02)"),
         (move(waypoint("A", Q, "<motionParameters blendRadius='0'/>"), waypoint("B", Q), kind="MoveP",
               blendRadius=0.02), "movep(A_q, a=2.0, v=1.5, r=0.0)"),
         (move(f"<CircleMove OrientationMode='FIXED'><children>{waypoint('A', Q) * 2}</children></CircleMove>",
@@ -214,22 +221,27 @@ def test_sub_programs_threads_and_initial_values_precede_the_program(lines):
     begin += "<SpecialSequence type='BeforeStart'><children><Halt/></children></SpecialSequence>"
     wait = "<Wait type='Sleep'><waitTime>1</waitTime></Wait>"
     thread = f"<Thread name='T 1'><children>{wait}</children></Thread>"
-    text = lines(call, before=begin, threads=thread + listed, repeats=True, InitVariablesNode="true")
+    hidden = "<suppressedNode class='Thread'><children><Halt/></children></suppressedNode>"
+    after = f"<SuppressedNode>{hidden}</SuppressedNode>{listed}{thread}"
+    text = lines(call, before=begin, threads=after, repeats=True, InitVariablesNode="true")
     assert text == [
         "def pick():", '$ 8 "pick"', '$ 9 "Halt"', "halt", "end", "global n=4",
         '$ 2 "BeforeStart"', '$ 3 "Halt"', "halt",
-        '$ 6 "T_1"', "thread T_1():", "while (True):", '$ 7 "Wait: 1.0"', "sleep(1.0)", "end", "end",
+        '$ 10 "T_1"', "thread T_1():", "while (True):", '$ 11 "Wait: 1.0"', "sleep(1.0)", "end", "end",
         "threadId_T_1 = run T_1()",
         "while (True):", '$ 4 "Robot Program"', '$ 5 "Call pick"', "pick()", "end",
     ]  # fmt: skip
+    with pytest.raises(UserFileError, match="sub-programs p 1 and p_1"):
+        lines(call, threads="<SubProgram name='p 1'/><SubProgram name='p_1'/>")
 
 
 INSTALLATION = """<Installation>
-<IOs><DigitalOutputNames value="lamp, , "/><ModbusSignal name="Plc 1" type="DIGITAL_INPUT"/></IOs>
+<IOs><DigitalInputNames value=", part"/>
+<DigitalOutputNames value="lamp, , "/><ModbusSignal name="Plc 1" type="DIGITAL_INPUT"/></IOs>
 <SafeHomeSettings enabled="true" position="0, 1, 0, 1, 0, 1"/>
 <TCPSettings activePose="hook" {}><availablePoses>
   <tcp name="hook" offset="0, 0, 0.2, 0, 0, 0"/></availablePoses></TCPSettings>{}
-<Features><GeomPoseNode name="table" isVariable="true"><toolPosition value="0.3, 0.4, 0"/>
+<Features><GeomPoseNode name="höhe" isVariable="true"><toolPosition value="0.3, 0.4, 0"/>
   <toolAxisAngle value="0, 0, 1"/></GeomPoseNode></Features>
 </Installation>"""
 
@@ -241,11 +253,11 @@ PAYLOAD = f'<PayloadSettings><Payload mass="1.5" defaultPayload="true" {CARRIED}
 @pytest.mark.parametrize(
     ("payload", "variables"),
     [
-        ((f'toolPayload="1.5" {CARRIED}', ""), b"#\ncount=3\n"),
+        ((f'toolPayload="1.5" {CARRIED}', ""), "#\nTür 1=[3,  4]\n".encode()),
         (
             ("", PAYLOAD),
             gzip.compress(
-                b'<InstallationVariables><variable name="count" value="3"/></InstallationVariables>'
+                '<InstallationVariables><variable name="Tür 1" value="[3,&#10;4]"/></InstallationVariables>'.encode()
             ),
         ),
     ],
@@ -257,16 +269,17 @@ def test_the_installation_gives_tcp_payload_signals_features_and_variables(tmp_p
     home = "<SafeHome positionOptionType='SPEED_AND_ACCELERATION' speed='1' acceleration='2'/>"
     tcp = "<Set type='NoAction'><tcp referencedName='hook'/></Set>"
     signal = "<ExpressionIO><pin referencedName='Plc 1'/></ExpressionIO>"
-    ready = f"<Wait type='Condition'>{expression(signal)}</Wait>"
+    part = signal.replace("Plc 1", "digital_in[1]")
+    ready = f"<Wait type='Condition'>{expression(signal, '≟', part)}</Wait>"
     (tmp_path / "p.urp").write_text(saved(lamp, own, home, tcp, ready))
     (tmp_path / "cell.installation").write_text(INSTALLATION.format(*payload))
     (tmp_path / "cell.variables").write_bytes(variables)
     text = read_program(tmp_path / "p.urp")
     expected = (
-        "set_tcp(p[0.0, 0.0, 0.2, 0.0, 0.0, 0.0])", "set_payload(1.5, [0.0, 0.0, 0.05])", "global count = 3",
-        "global table = p[0.3, 0.4, 0.0, 0.0, 0.0, 1.0]", "set_standard_digital_out(0, True)",
+        "set_tcp(p[0.0, 0.0, 0.2, 0.0, 0.0, 0.0])", "set_payload(1.5, [0.0, 0.0, 0.05])", "global Tu252r_1 = [3, 4]",
+        "global hu246he = p[0.3, 0.4, 0.0, 0.0, 0.0, 1.0]", "set_standard_digital_out(0, True)",
         '"Set lamp=On"', "movej([0.0, 1.0, 0.0, 1.0, 0.0, 1.0], a=2.0, v=1.0)",
-        'while (not(modbus_get_signal_status("Plc 1"))):',
+        'while (not(modbus_get_signal_status("Plc 1") == get_standard_digital_in(1))):', '"Wait: Plc 1≟part"',
     )  # fmt: skip
     for line in expected:
         assert line in text
@@ -280,15 +293,24 @@ QUESTION = "<Assignment valueSource='Operator' message='?' valueType='{}'><varia
 
 
 @pytest.mark.parametrize(
-    ("kind", "answer", "value", "wrong"),
-    [("Boolean", "true", "True", "perhaps"), ("Integer", "-3", "-3", "2.5"), ("Float", "2", "2.0", "wide")],
+    ("kind", "answer", "value", "wrong", "form"),
+    [
+        ("Boolean", "true", "True", "perhaps", "x=true or x=false"),
+        ("Integer", "-3", "-3", "2.5", "x=NUMBER, a whole number"),
+        ("Float", "2", "2.0", "wide", "x=NUMBER"),
+    ],
 )
-def test_an_answer_goes_to_the_variable_of_its_question(lines, kind, answer, value, wrong):
+def test_an_answer_goes_to_the_variable_of_its_question(lines, kind, answer, value, wrong, form):
     question = QUESTION.format(kind)
     assert lines(question, answers={"x": answer})[1:] == ["$ 2 \"x≔'?'\"", f"global x={value}"]
-    for answers in ({"y": answer}, {"x": wrong}):
-        with pytest.raises(UserFileError, match=f"--answer x={kind.upper()}"):
-            lines(question, answers=answers)
+    asked = {r'"\?"': {"y": answer}, rf'"\?", but x={wrong} is no answer': {"x": wrong}}
+    for what, answers in asked.items():
+        with pytest.raises(UserFileError, match=f"it asks {what}: give --answer {form}$"):
+            lines(question, question, answers=answers)
+    silent = question.replace("message='?' ", "").replace("'x'", "'y'")
+    assert lines(silent, answers={"y": answer})[1] == "$ 2 \"y≔''\""
+    with pytest.raises(UserFileError, match=rf"{form}; for y: give --answer y="):
+        lines(question, silent)
 
 
 def test_a_timer_counts_the_time_between_start_and_stop(lines):
@@ -318,7 +340,11 @@ def test_a_timer_counts_the_time_between_start_and_stop(lines):
         (move(waypoint("A", Q), useActiveTCP="false", inside="<tcp referencedName='hook'/>"), "the TCP hook"),
         ("<Set type='DigitalOutput'><pin referencedName='RearPlc'/></Set>", "the signal RearPlc"),
         (f"<Assignment><variable/>{expression('1')}</Assignment>", "a variable without a name"),
-        (QUESTION.format("Float"), "a question: give --answer x=FLOAT"),
+        (QUESTION.format("Colour"), r"a question \(Colour\)"),
+        ("<Set type='NoAction' payload='1.5'/>", r"Set \(with a payload\)"),
+        (move(waypoint("A 1", Q), waypoint("A_1", Q)), r"the waypoints A 1 and A_1 \("),
+        (move(f"<{DIRECTION}><feature reference='../x'/></{DIRECTION}>", kind="MoveL"),
+         "a feature that is not in the file"),
         ("<If type='If' checkContinuously='true'><children/></If><If type='ElseIf'/>", r"If \(ElseIf\)"),
         (contributed("com.other.Node", "Vision", name="Cam"), "Cam: Vision"),
         (contributed(f"{GRIPPER}gripper_validation_if_node", "If"), "Robotiq_Grippers: If outside a Grip Check"),
@@ -352,7 +378,9 @@ def test_the_clients_text_replaces_the_external_control_node(lines, tmp_path):
 
 def test_a_program_that_only_defines_functions_does_not_repeat(lines):
     node = "<Script type='File'><cachedContents>def step():\n  sync()\nend</cachedContents></Script>"
-    assert "while (True):" not in lines(node, repeats=True)
+    idle = "<Placeholder/><SuppressedNode/>" + contributed("com.other.Node", "Vision", name="Cam")
+    thread = f"<Thread name='t'><children>{idle}</children></Thread>"
+    assert "while (True):" not in lines(node, idle, threads=thread, skip=["Cam"], repeats=True)
     assert "while (True):" in lines(node, "<Wait type='Sleep'><waitTime>1</waitTime></Wait>", repeats=True)
 
 

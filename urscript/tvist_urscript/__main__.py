@@ -33,9 +33,10 @@ def main(arguments: list[str]) -> int:
     lines = text.split("\n")
     found = check(text, ARRAYS)
     errors = [error for error in found.errors if not _is_of_robot(error, lines)]
-    kinds = ("", errors), ("warning: ", found.warnings)
-    for kind, error in [(kind, error) for kind, them in kinds for error in them]:
-        print(f"{path}:{error.line}:{error.column}: {kind}{error.text}")
+    for error in errors:
+        print(f"{path}:{error.line}:{error.column}: {error.text}")
+    for warning in found.warnings:
+        print(f"{path}:{warning.line}:{warning.column}: warning: {warning.text}")
     return 1 if errors else 0
 
 

@@ -88,7 +88,7 @@ class Builder(Transformer[Token, Any]):
 
     def chained(self, *parts: Any) -> None:
         _, equal, _ = parts
-        raise no_program(equal, "a statement assigns one variable: give `a = b = 1` a line for each")
+        raise no_program(equal, "a statement assigns one variable: write `b = 1`, then `a = b`")
 
     def either(self, *values: Any, operator: Literal["or", "xor", "and"] = "or") -> tree.Logic:
         first, *_ = values

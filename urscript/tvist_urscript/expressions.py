@@ -101,7 +101,9 @@ class Expressions:
     def name(self, node: tree.Name) -> ast.expr:
         variable = self.scope.variable(node.name)
         if variable is None:
-            self.report(node, name_not_found(node.name) + self.scope.hint(node.name))
+            known = node.name in self.signatures
+            hint = f" {node.name} is a function: call it" if known else self.scope.hint(node.name)
+            self.report(node, name_not_found(node.name) + hint)
         return located(name(f"v_{node.name}" if variable == "local" else f"g_{node.name}"), node)
 
     def binary(self, node: tree.Binary) -> ast.expr:

@@ -45,9 +45,9 @@ def run(
     do not pause it: they are printed and closed. With --lockstep, several programs run one after the other,
     each on a new robot.
 
-    With --check, nothing runs. An error is anything that keeps a program from starting: wrong syntax, unknown
-    names, and calls with wrong arguments. A UR function that tvist does not simulate is a warning: the
-    program starts, and ends with an error when it calls that function.
+    With --check, nothing runs. An error is anything that keeps a program from starting: wrong syntax or an
+    unknown name. A call that can only fail, since its arguments do not fit or tvist does not simulate the
+    function, is a warning: the program ends when it reaches it.
 
     Args:
         file: Run this program, URScript or a .urp file that PolyScope saved; with --lockstep or --check these
@@ -73,12 +73,11 @@ def run(
         json: Print one JSON object at the end instead of messages; for several programs it contains a list.
         given: Fields of `ServeConfig`.
     """
-    from tvist_cli.program_runs import check_scripts, print_scripts
+    from tvist_cli.program_runs import answers_of, check_scripts, print_scripts
     from tvist_cli.running import run_programs
     from tvist_server.polyscope.nodes import Choices
 
-    answers = {name: value for name, _, value in (one.partition("=") for one in answer or ())}
-    choices = Choices(frozenset(skip or ()), answers)
+    choices = Choices(frozenset(skip or ()), answers_of(answer or ()))
     runs = any((given, lockstep, inputs, config, timeout is not None, limits != NO_LIMITS, junit, baseline))
     if translate:
         if runs or check or json:

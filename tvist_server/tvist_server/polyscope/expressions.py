@@ -4,12 +4,13 @@ import re
 from xml.etree.ElementTree import Element
 
 from tvist_plant.user_file import LONGEST_NAME
-from tvist_server.polyscope.installation import Installation
+from tvist_server.polyscope.installation import Installation, script_name
 from tvist_server.polyscope.references import References
 
 _SIGNS = {"≟": " == ", "≠": " != ", "≤": " <= ", "≥": " >= ", "×": "*", "÷": "/"}
 _NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 _PIN = re.compile(r'(\w+)\[(\d{1,3}|"[\w .-]+")\]')
+_SHORT = {"digital_out": "DO", "config_out": "CO", "tool_out": "TO"}  # in labels of Set nodes
 _NAMES = ("name", "featureName", "referencedName")  # attributes that name a variable or feature
 _READ = {
     "digital_in": "get_standard_digital_in", "digital_out": "get_standard_digital_out",
@@ -32,12 +33,6 @@ _WRITE = {
 
 class UnknownPartError(Exception):
     """Something that cannot be translated; the message says what it is."""
-
-
-def script_name(text: str) -> str:
-    """Return a name as PolyScope writes it in scripts: non-ASCII letters become `u` and their code points."""
-    plain = "".join(c if re.match(r"\w", c, re.ASCII) else f"u{ord(c)}" if c.isalpha() else "_" for c in text)
-    return plain if plain[:1].isalpha() or plain[:1] == "_" else f"_{plain}"
 
 
 def quoted(text: str) -> str:
@@ -66,6 +61,7 @@ class Expressions:
         match part.tag:
             case "ExpressionChar":
                 character = part.get("character") or ""
+                character = character if character.isprintable() else " "
                 return _SIGNS.get(character, character), character
             case "ExpressionToken":
                 token = part.get("token") or ""
@@ -93,7 +89,8 @@ class Expressions:
     def output(self, node: Element | None) -> tuple[str, str, str]:
         """Return the function that sets an output, its number, and its name."""
         function, number, name = self._pin(node, _WRITE)
-        return function, number, self._installation.shown(name)
+        kind, bracket, rest = name.partition("[")
+        return function, number, f"{_SHORT.get(kind, kind)}{bracket}{rest}"
 
     def input(self, node: Element | None) -> str:
         """Return the call that reads a signal."""
@@ -103,7 +100,9 @@ class Expressions:
     def _pin(self, node: Element | None, functions: dict[str, str]) -> tuple[str, str, str]:
         target = self._references.target(node)
         name = "" if target is None else target.get("referencedName") or ""
-        words = _PIN.fullmatch(self._installation.pin(name))
+        pins = self._installation.pins
+        words = _PIN.fullmatch(pins.get(name, name))
         if words is None or words[1] not in functions:
             raise UnknownPartError(f"the signal {name or 'without a name'}")
-        return functions[words[1]], words[2], name
+        shown = next((one for one, pin in pins.items() if pin == words[0]), words[0])
+        return functions[words[1]], words[2], shown

@@ -1,5 +1,6 @@
 """The installation of a program saved by PolyScope: TCPs, payload, names of signals, positions of features."""
 
+import re
 from dataclasses import dataclass, field
 from typing import Self
 from xml.etree.ElementTree import Element
@@ -12,7 +13,6 @@ _SIGNALS = {
     "GeneralPurposeIntRegisterInputNames": "gp_int_in", "GeneralPurposeIntRegisterOutputNames": "gp_int_out",
     "GeneralPurposeFloatRegisterInputNames": "gp_float_in", "GeneralPurposeFloatRegisterOutputNames": "gp_float_out",
 }  # fmt: skip
-_SHORT = {"digital_out": "DO", "config_out": "CO", "tool_out": "TO"}  # in labels
 _LARGEST = 1e6  # largest magnitude of a number that is accepted
 
 Pose = tuple[float, ...]
@@ -60,24 +60,13 @@ class Installation:
         pins |= {one.get("name") or "": f'modbus["{one.get("name")}"]' for one in tree.iter("ModbusSignal")}
         features = {
             one.get("name") or "": numbers(place.get("value"), 3) + numbers(turn.get("value"), 3)
-            for one in tree.iter("GeomPoseNode")
-            if one.get("isVariable") == "true"
-            and (place := one.find("toolPosition")) is not None
+            for one in tree.iterfind(".//GeomPoseNode[@isVariable='true']")
+            if (place := one.find("toolPosition")) is not None
             and (turn := one.find("toolAxisAngle")) is not None
         }
-        home = tree.find("SafeHomeSettings")
-        at = None if home is None or home.get("enabled") != "true" else numbers(home.get("position"), 6)
+        home = tree.find("SafeHomeSettings[@enabled='true']")
+        at = None if home is None else numbers(home.get("position"), 6)
         return cls(tcps, active, pins, features, variables, at)
-
-    def pin(self, name: str) -> str:
-        """Return the signal with a name of the installation, or the name itself."""
-        return self.pins.get(name, name)
-
-    def shown(self, output: str) -> str:
-        """Return how PolyScope names an output in labels."""
-        kind, bracket, number = (pin := self.pin(output)).partition("[")
-        plain = f"{_SHORT.get(kind, kind)}{bracket}{number}"
-        return next((name for name, signal in self.pins.items() if signal == pin), plain)
 
     def start(self) -> list[str]:
         """Return the lines of URScript with which PolyScope begins a program."""
@@ -86,8 +75,14 @@ class Installation:
             lines.append(f"set_tcp({pose(self.active.offset)})")
             if self.active.mass is not None:
                 lines.append(f"set_payload({self.active.mass!r}, {list(self.active.cog)})")
-        lines += [f"global {name} = {pose(at)}" for name, at in self.features.items() if name]
-        return lines + [f"global {name} = {value}" for name, value in self.variables.items()]
+        values = {name: pose(at) for name, at in self.features.items() if name} | self.variables
+        return lines + [f"global {script_name(name)} = {' '.join(values[name].split())}" for name in values]
+
+
+def script_name(text: str) -> str:
+    """Return a name as PolyScope writes it in scripts: non-ASCII letters become `u` and their code points."""
+    plain = "".join(c if re.match(r"\w", c, re.ASCII) else f"u{ord(c)}" if c.isalpha() else "_" for c in text)
+    return plain if plain[:1].isalpha() or plain[:1] == "_" else f"_{plain}"
 
 
 def numbers(text: str | None, count: int) -> Pose:

@@ -5,8 +5,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
-from tvist_server.polyscope.expressions import Expressions, UnknownPartError, script_name
-from tvist_server.polyscope.installation import Installation, numbers, pose
+from tvist_server.polyscope.expressions import Expressions, UnknownPartError
+from tvist_server.polyscope.installation import Installation, numbers, pose, script_name
 from tvist_server.polyscope.positions import joint_angles, tool_pose
 from tvist_server.polyscope.references import References
 from tvist_server.polyscope.script_text import ScriptText
@@ -49,7 +49,7 @@ class _Style:
     tcp: str  # TCP to set before each motion; empty: the active TCP
     flange: bool  # whether waypoints are poses of the flange
     feature: Element | None
-    ends: bool  # whether nothing or another kind of Move follows, so that the last waypoint has no blend
+    ends: bool  # whether the last waypoint has no blend: nothing or another kind of Move to waypoints follows
 
 
 class Moves:
@@ -67,6 +67,7 @@ class Moves:
         self._text, self._expressions, self._references = text, expressions, references
         self._installation, self._following, self._children = installation, following, children
         self._styles: list[_Style] = []
+        self._names: dict[str, str] = {}  # names of taught waypoints by their names in scripts
         self.waypoints: dict[str, str] = {}  # values of the variables that taught waypoints need
         self.has_directions = False
 
@@ -75,13 +76,14 @@ class Moves:
         kind, following = node.get("motionType") or "", self._following[node]
         if kind not in _FUNCTIONS or node.get("optimoveEnabled") == "true":
             raise UnknownPartError(f"Move ({kind or 'without a type'})")
+        has_direction = following is not None and following.find(f"./children/{DIRECTION}") is not None
         speed, acceleration = _number(node.get("speed")), _number(node.get("acceleration"))
         tcp, active = node.find("tcp"), node.get("useActiveTCP") != "false"
         style = _Style(
             kind, speed, acceleration, numbers(node.get("blendRadius") or "0", 1)[0],
             node.get("positionType") == "JointAngles",
             "" if active or tcp is None else self.tcp(tcp), not active and tcp is None, node.find("feature"),
-            following is None or following.get("motionType") not in {None, "MoveP"},
+            following is None or (following.get("motionType") not in {None, "MoveP"} and not has_direction),
         )  # fmt: skip
         self._text.label(node, kind)
         self._styles.append(style)
@@ -134,8 +136,10 @@ class Moves:
 
     def _place(self, node: Element) -> tuple[str, str]:
         """Return a waypoint's pose or posture in URScript, and a posture near the pose if taught, else ""."""
-        name = script_name(self._name(node))
-        position = self._references.target(node.find("position"))
+        shown, position = self._name(node), self._references.target(node.find("position"))
+        name = script_name(shown)
+        if position is not None and (other := self._names.setdefault(name, shown)) != shown:
+            raise UnknownPartError(f"the waypoints {other} and {shown} (scripts have one name for both)")
         try:
             match node.get("type"):
                 case "Variable":
@@ -215,6 +219,8 @@ class Moves:
     def feature(self, node: Element | None) -> tuple[str, str]:
         """Return a feature's name and its pose as URScript."""
         target = self._references.target(node)
+        if node is not None and target is None:
+            raise UnknownPartError("a feature that is not in the file")
         name = "Joint_0_name" if target is None else target.get("referencedName") or ""
         if name in _FEATURES:
             return _FEATURES[name]

@@ -6,19 +6,22 @@ from itertools import pairwise
 from typing import NoReturn
 from xml.etree.ElementTree import Element
 
+from tvist_protocol.errors import short
 from tvist_server.polyscope import contributed
-from tvist_server.polyscope.expressions import Expressions, UnknownPartError, quoted, script_name
-from tvist_server.polyscope.installation import Installation, numbers
+from tvist_server.polyscope.expressions import Expressions, UnknownPartError, quoted
+from tvist_server.polyscope.installation import Installation, numbers, script_name
 from tvist_server.polyscope.moves import DIRECTION, Moves
 from tvist_server.polyscope.references import References
 from tvist_server.polyscope.script_text import ScriptText
 
 _OTHERS = "2147483647"  # case value of a Switch's default case
 _TIMED = {"Start": "_rate = 1", "Stop": "_rate = 0", "Reset": " = 0"}  # what a Timer does to its variables
-_ANSWERS: dict[str, Callable[[str], str]] = {
-    "Boolean": lambda text: {"true": "True", "false": "False"}[text.lower()], "String": quoted,
-    "Integer": lambda text: str(int(text)), "Float": lambda text: repr(numbers(text, 1)[0]),
-}  # fmt: skip
+_ANSWERS: dict[str, tuple[str, Callable[[str], str]]] = {
+    "Boolean": ("{0}=true or {0}=false", lambda text: {"true": "True", "false": "False"}[text.lower()]),
+    "Integer": ("{0}=NUMBER, a whole number", lambda text: str(int(text))),
+    "Float": ("{0}=NUMBER", lambda text: repr(numbers(text, 1)[0])),
+    "String": ("{0}=TEXT", quoted),
+}  # forms of answers of each type, and their translations
 _TASK = {"selection", "wrench", "limitsForce", "limitsMotion"}  # what a Force node has
 _POPUPS = {"Message": "False, False", "Warning": "True, False", "Error": "False, True"}
 
@@ -29,6 +32,12 @@ class Choices:
 
     skip: frozenset[str] = frozenset()  # URCaps, or `URCap: node`, whose nodes are left out
     answers: Mapping[str, str] = field(default_factory=dict)  # operator's answers by the variables they go to
+    used: set[str] = field(default_factory=set)  # names of `answers` that questions have used
+
+    def skips(self, node: Element) -> bool:
+        """Return whether a node is of a URCap that is left out."""
+        names = {contributed.kind_of(node), node.get("strategyURCapName")}
+        return node.tag == "Contributed" and not self.skip.isdisjoint(names)
 
 
 NONE = Choices()
@@ -50,7 +59,7 @@ def inside(node: Element) -> Iterator[Element]:
 
 
 class Nodes:
-    """Translates nodes into `text`; `missing` lists what it cannot translate, in order."""
+    """Translates nodes into `text`; `missing` and `questions` list what it cannot translate or answer, in order."""
 
     def __init__(
         self,
@@ -59,7 +68,7 @@ class Nodes:
         numbers_of: dict[Element, int],
         choices: Choices = NONE,
     ) -> None:
-        self.text, self.missing = ScriptText(numbers_of), list[str]()
+        self.text, self.missing, self.questions = ScriptText(numbers_of), list[str](), list[str]()
         self.timers: dict[str, None] = {}  # names of timers
         self._references, self._choices, self._home = references, choices, installation.home
         self._flags: dict[Element | None, str] = {}  # flags of Ifs checked continuously, by the next nodes
@@ -149,26 +158,35 @@ class Nodes:
         said = quoted(message)
         if node.get("inputType") == "Variable":
             said = f'str_cat("", {self.expressions.variable(node.find("variable"))})'
-        call = f'popup({said}, "{kind}", {_POPUPS[kind]}, blocking=True)'
+        call = f'popup({said}, "{kind}", {_POPUPS[kind]}, blocking={not halt})'
         self.text.label(node, f"Popup: {message}" if message else "Popup", call, *halt)
 
     def _assignment(self, node: Element) -> None:
         name = self.expressions.variable(node.find("variable"))
         source = node.get("valueSource") or "Expression"
         if source == "Operator":
-            shown, value = f"'{node.get('message')}'", self._answer(name, node.get("valueType") or "")
+            message = node.get("message") or ""
+            shown, value = f"'{message}'", self._answer(name, node.get("valueType") or "", message)
         elif source == "Expression":
             shown, value = self.expressions.label(node), self.expressions.text(node)
         else:
             raise UnknownPartError(f"Assignment ({source})")
         self.text.label(node, f"{name}≔{shown}", f"global {name}={value}")
 
-    def _answer(self, name: str, kind: str) -> str:
-        """Return the answer of the operator as URScript."""
-        try:
-            return _ANSWERS[kind](self._choices.answers[name])
-        except (KeyError, ValueError):
-            raise UnknownPartError(f"a question: give --answer {name}={kind.upper()}") from None
+    def _answer(self, name: str, kind: str, message: str) -> str:
+        """Return the answer of the operator as URScript; add to `questions` if there is none."""
+        if kind not in _ANSWERS:
+            raise UnknownPartError(f"a question ({kind or 'without a type'})")
+        form, translate = _ANSWERS[kind]
+        asked = f'"{short(message)}"' if message else f"for {name}"
+        if (given := self._choices.answers.get(name)) is not None:
+            self._choices.used.add(name)
+            try:
+                return translate(given)
+            except (KeyError, ValueError):
+                asked += f", but {name}={short(given)} is no answer"
+        self.questions.append(f"{asked}: give --answer {form.format(name)}")
+        return ""
 
     def _if(self, node: Element) -> None:
         kind, condition = node.get("type") or "If", self.expressions.text(node)
@@ -185,15 +203,15 @@ class Nodes:
             with self.text.block(f"thread Thread_if_{number}():"):
                 self.children(node)
                 self.text.line(f"{flag} = 1")
-            self._run_while(f"if_{number}", condition, f"{flag} == 0 and ({condition})")
+            self._run_while(number, "if", condition, f"{flag} == 0 and ({condition})")
             return
         more = following is not None and following.tag == "If" and following.get("type") != "If"
         self._branch(node, heads[kind], title if kind == "If" else title.rstrip(), more=more)
 
-    def _run_while(self, name: str, starts: str, lasts: str) -> None:
-        handler = f"thread_handler_{name.rpartition('_')[2]}"
+    def _run_while(self, number: int, kind: str, starts: str, lasts: str) -> None:
+        handler = f"thread_handler_{number}"
         with self.text.block(f"if ({starts}):"):
-            self.text.line(f"global {handler}=run Thread_{name}()")
+            self.text.line(f"global {handler}=run Thread_{kind}_{number}()")
             with self.text.block(f"while ({lasts}):"):
                 self.text.line("sync()")
             self.text.line(f"kill {handler}")
@@ -226,13 +244,14 @@ class Nodes:
         with self.text.block(f"thread Thread_while_{number}():"), self.text.block("while (True):"):
             self.children(node)
             self.text.line("sync()")
-        self._run_while(f"while_{number}", condition, condition)
+        self._run_while(number, "while", condition, condition)
 
     def _switch(self, node: Element) -> None:
         self._switches += 1
         name, shown = f"switch_{self._switches}", self.expressions.label(node)
         self.text.label(node, f"Switch {shown}", f"{name} = {self.expressions.text(node)}")
         cases = [case for case in children_of(node) if case.tag == "Case"]
+        cases.sort(key=lambda case: case.get("caseValue") == _OTHERS)  # `else` must be the last branch
         for place, case in enumerate(cases):
             value = case.get("caseValue") or ""
             if value == _OTHERS and place:
@@ -252,7 +271,9 @@ class Nodes:
     # ------------------------------------------------------------------ robot
 
     def _set(self, node: Element) -> None:
-        kind, tcp, title, lines = node.get("type"), node.find("tcp"), "Set", list[str]()
+        if numbers(node.get("payload") or "0", 1)[0]:
+            raise UnknownPartError("Set (with a payload)")
+        kind, title, lines = node.get("type"), "Set", list[str]()
         if kind in {"DigitalOutput", "ExpressionOutput"}:
             function, number, name = self.expressions.output(node.find("pin"))
             on = node.findtext("digitalValue") in {"1", "true"}
@@ -262,7 +283,9 @@ class Nodes:
             title, lines = f"Set {name}={shown}", [f"{function}({number}, {value})"]
         elif kind != "NoAction":
             raise UnknownPartError(f"Set ({kind or 'without a type'})")
-        self.text.label(node, title, *lines, *([] if tcp is None else [self.moves.tcp(tcp)]))
+        if (tcp := node.find("tcp")) is not None:
+            lines.append(self.moves.tcp(tcp))
+        self.text.label(node, title, *lines)
 
     def _timer(self, node: Element) -> None:
         name, action = self.expressions.variable(node.find("variable")), node.get("action") or ""
@@ -285,8 +308,7 @@ class Nodes:
             _refuse(node)
         name, frame = self.moves.feature(node.find("feature"))
         chosen = [int(axis) for axis in parts["selection"]]
-        by_axis = ("limitsForce" if axis else "limitsMotion" for axis in chosen)
-        limits = [parts[name][axis] for axis, name in enumerate(by_axis)]
+        limits = [parts["limitsForce" if on else "limitsMotion"][axis] for axis, on in enumerate(chosen)]
         frame = "tool_pose()" if name == "Tool" else frame
         call = f"force_mode({frame}, {chosen}, {list(parts['wrench'])}, 2, {limits})"
         self._forced(node, "Force", "sleep(0.02)", "zero_ftsensor()", call)
@@ -299,7 +321,7 @@ class Nodes:
     def _contributed(self, node: Element) -> None:
         kind, following = contributed.kind_of(node), self._following[node]
         title = node.get("strategyProgramNodeType") or "URCap"
-        if {kind, node.get("strategyURCapName")} & self._choices.skip:
+        if self._choices.skips(node):
             return
         if (lines := contributed.lines_of(node)) is not None:
             self.text.label(node, title, *lines)

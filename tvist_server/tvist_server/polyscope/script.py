@@ -8,10 +8,10 @@ from xml.etree.ElementTree import Element
 from tvist_plant.user_file import UserFileError
 from tvist_protocol.errors import short
 from tvist_server.polyscope.contributed import EXTERNAL_CONTROL
-from tvist_server.polyscope.expressions import UnknownPartError, script_name
-from tvist_server.polyscope.installation import Installation
+from tvist_server.polyscope.expressions import UnknownPartError
+from tvist_server.polyscope.installation import Installation, script_name
 from tvist_server.polyscope.moves import TOWARDS
-from tvist_server.polyscope.nodes import NONE, Choices, Nodes, inside
+from tvist_server.polyscope.nodes import NONE, Choices, Nodes, children_of, inside
 from tvist_server.polyscope.references import References
 from tvist_server.polyscope.script_text import ScriptText
 
@@ -34,13 +34,11 @@ def script_of(
 
     `installed` returns the installation of a name.
     """
-    root, main = tree.find("./children"), tree.find("./children/MainProgram")
-    if root is None or main is None or main.find("./children/*") is None:
-        raise UserFileError("it has no program that can be read: save it in PolyScope as a script")
-    begin, before, threads = map(root.findall, ("./InitVariablesNode", "./SpecialSequence", "./Thread"))
     references = References(tree)
-    functions = _functions(root, references)
-    parts = (*begin, *before, main, *threads, *functions.values())
+    parts, functions = _parts(tree, references), _functions(tree, references)
+    main = next((part for part in parts if part.tag == "MainProgram"), None)
+    if main is None or main.find("./children/*") is None:
+        raise UserFileError("it has no program that can be read: save it in PolyScope as a script")
     numbers = {node: number for number, node in enumerate(chain.from_iterable(map(inside, parts)), 1)}
     given = installed(tree.get("installation") or "default")
     nodes = Nodes(references, given, numbers, choices)
@@ -50,36 +48,33 @@ def script_of(
             text.label(function, title)
             nodes.children(function)
     if main.get("InitVariablesNode") == "true":
-        for variable in root.findall("./InitVariablesNode/variables/variable"):
+        for variable in tree.findall("./children/InitVariablesNode/variables/variable"):
             _initial(nodes, variable)
-    for sequence in before:
+    for sequence in (part for part in parts if part.tag == "SpecialSequence"):
         text.label(sequence, "BeforeStart")
         nodes.children(sequence)
-    for thread in threads:
+    for thread in (part for part in parts if part.tag == "Thread"):
         title = script_name(thread.get("name") or "Thread")
         text.label(thread, title)
-        with text.block(f"thread {title}():"):
-            _repeated(nodes, thread, again=thread.get("runOnlyOnce") != "true")
+        again = thread.get("runOnlyOnce") != "true" and _acts(thread, choices)
+        with text.block(f"thread {title}():"), text.block("while (True):") if again else nullcontext():
+            nodes.children(thread)
         text.line(f"threadId_{title} = run {title}()")
-    again = main.get("runOnlyOnce") == "false" and _acts(main)
-    _repeated(nodes, main, again=again, label="Robot Program")
+    again = main.get("runOnlyOnce") == "false" and _acts(main, choices)
+    with text.block("while (True):") if again else nullcontext():
+        text.label(main, "Robot Program")
+        nodes.children(main)
     if nodes.missing:
         found = ", ".join(dict.fromkeys(map(short, nodes.missing)))
         raise UserFileError(f"PolyScope saved it with {found}, which cannot be simulated")
+    if nodes.questions:
+        raise UserFileError(f"it asks {'; '.join(dict.fromkeys(nodes.questions))}")
     start = ScriptText()
     start.line(*given.start(), *(f"global {at}={value}" for at, value in nodes.moves.waypoints.items()))
     start.line(*(_COUNTING.format(timer) for timer in nodes.timers))
     if nodes.moves.has_directions:
         start.line(TOWARDS)
     return program_text(name, f"{start}{text}")
-
-
-def _repeated(nodes: Nodes, part: Element, *, again: bool, label: str = "") -> None:
-    """Translate a main program (it has a label) or a thread; `again`: inside an endless loop."""
-    with nodes.text.block("while (True):") if again else nullcontext():
-        if label:
-            nodes.text.label(part, label)
-        nodes.children(part)
 
 
 def _initial(nodes: Nodes, variable: Element) -> None:
@@ -92,23 +87,32 @@ def _initial(nodes: Nodes, variable: Element) -> None:
         nodes.text.line(f"global {name}={value}")
 
 
-def _functions(root: Element, references: References) -> dict[str, Element]:
+def _parts(tree: Element, references: References) -> list[Element]:
+    """Return the parts of a file in its order, as PolyScope numbers them: suppressed ones too."""
+    listed = tree.findall("./children/*")
+    shown = (one.find("suppressedNode") if one.tag == "SuppressedNode" else one for one in listed)
+    return [part for part in dict.fromkeys(map(references.target, shown)) if part is not None]
+
+
+def _functions(tree: Element, references: References) -> dict[str, Element]:
     """Return the sub-programs of a file by their names in scripts."""
     found: dict[str, Element] = {}
-    for one in root.findall("./SubProgram"):
-        target = references.target(one)
-        if target is not None and target.get("name"):
-            found[script_name(target.get("name") or "")] = target
+    for target in map(references.target, tree.findall("./children/SubProgram")):
+        if target is None or not (name := target.get("name")):
+            continue
+        other = found.setdefault(script_name(name), target).get("name")
+        if other != name:
+            raise UserFileError(f"scripts have one name for its sub-programs {other} and {name}: rename one")
     return found
 
 
-def _acts(main: Element) -> bool:
-    """Return whether a program does more than define functions; if not, a loop around it would never wait."""
-    return any(
-        node.tag not in {"Comment", "MainProgram", "Folder", "SuppressedNode"}
-        and not (node.tag == "Script" and _only_defines(node.findtext("cachedContents") or ""))
-        for node in inside(main)
-    )
+def _acts(node: Element, choices: Choices) -> bool:
+    """Return whether a node does more than define functions; if not, a loop around it would never wait."""
+    if node.tag in {"Comment", "Placeholder", "SubProgram", "SuppressedNode"} or choices.skips(node):
+        return False
+    if node.tag in {"MainProgram", "Thread", "Folder"}:
+        return any(_acts(one, choices) for one in children_of(node))
+    return node.tag != "Script" or not _only_defines(node.findtext("cachedContents") or "")
 
 
 def _only_defines(text: str) -> bool:

@@ -5,6 +5,8 @@ from contextlib import contextmanager
 from types import MappingProxyType
 from xml.etree.ElementTree import Element
 
+from tvist_protocol.errors import short
+
 
 class ScriptText:
     """Lines of URScript."""
@@ -22,6 +24,7 @@ class ScriptText:
     def label(self, node: Element, title: str, *lines: str) -> None:
         """Add the label of a node, then lines."""
         plain = "".join(c for c in title.replace('"', "'") if c.isprintable())
+        plain = short(plain, 250)  # has fewer bytes than a text may have
         self.line(f'$ {self.numbers[node]} "{plain}"', *lines)
 
     @contextmanager
