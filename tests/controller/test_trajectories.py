@@ -25,6 +25,7 @@ from tvist_protocol.simulation import SimulationInject, SimulationReset
 from .robots import Q1, UR5E, H, Kept, NoArm, Robot, setup
 
 STILL = (0.0,) * 6
+RAISED = (0.0, -0.9, 0.0, -1.57, 0.0, 0.0)
 KINDS = ("linear", "cubic", "quintic")
 LIMITS = UR5E.limits
 EACH_JOINT = (
@@ -126,15 +127,31 @@ def alone(shaper):
     return robot.column("target_q")
 
 
-def test_a_trajectory_that_needs_more_torque_than_a_joint_has_is_refused_with_point_and_joint():
-    robot = Robot(plant=NoArm(), q=(0.0, -0.9, 0.0, -1.57, 0.0, 0.0), shaper="none")
-    points = tuple(
-        TrajectoryPoint(time=time, q=(0.0, turn, 0.0, -1.57, 0.0, 0.0), qd=STILL, qdd=STILL)
-        for time, turn in ((1.0, -0.9), (1.5, -0.4))
+def swings(*turns):
+    """Return points at rest at given times and shoulder angles, from the raised posture."""
+    return tuple(
+        TrajectoryPoint(time=time, q=(0.0, turn, *RAISED[2:]), qd=STILL, qdd=STILL) for time, turn in turns
     )
-    reply = robot.send(MoveTrajectory, points=points)
+
+
+def test_a_trajectory_that_needs_more_torque_than_a_joint_has_is_refused_with_point_and_joint():
+    robot = Robot(plant=NoArm(), q=RAISED, shaper="none")
+    reply = robot.send(MoveTrajectory, points=swings((1.0, -0.9), (1.5, -0.4)))
     assert (reply.code, reply.where, reply.limit) == ("limit_torque", "points[1]", LIMITS.torque[1])
     assert "joint shoulder would need a torque of" in reply.why
+
+
+def test_the_way_between_ticks_is_as_smooth_as_the_checked_one():
+    """A lower time rate plays it; the points' own curve turns by 0.3 rad and back between two ticks."""
+    robot = Robot(plant=NoArm(), q=tuple(BENT))
+    turns = ((0.5, 0.0), (0.5 + H / 2, 0.3), (0.5 + H, 0.0), (1.5, 0.05))
+    points = tuple(
+        TrajectoryPoint(time=time, q=(*BENT[:5], BENT[5] + turn), qd=STILL) for time, turn in turns
+    )
+    assert isinstance(robot.send(MoveTrajectory, points=points), Accepted)
+    assert robot.send(c.SetSpeed, fraction=0.37) == Done()
+    robot.until_rest()
+    assert np.abs(np.diff(robot.column("target_q"), axis=0)).max() / H < 0.08
 
 
 def places(way, positions):
