@@ -248,6 +248,20 @@ def test_a_change_of_payload_or_shaper_is_checked_on_the_rest_of_the_way(seconds
     assert robot.send(c.SetShaper, name="zvd") == Done()
 
 
+def test_payload_and_shaper_change_at_any_tick_of_the_shaped_end_of_a_trajectory():
+    robot = Robot(plant=NoArm(), q=tuple(BENT), shaper="um_zv", calibration=load("ur5e_modal"))
+    point = TrajectoryPoint(time=0.5, q=tuple(BENT + 0.2), qd=STILL)
+    assert isinstance(robot.send(MoveTrajectory, points=(point,)), Accepted)
+    robot.tick(240)
+    weight = {"mass": 1.0, "com": (0.0, 0.0, 0.03), "inertia": (0.01, 0.0, 0.0, 0.01, 0.0, 0.01)}
+    for _ in range(80):
+        robot.tick()
+        assert robot.send(c.SetPayload, **weight) == Done()
+        assert robot.send(c.SetShaper, name="um_zv") == Done()
+    robot.until_rest()
+    assert motions(robot) == ["motion_started", "motion_done"]
+
+
 def test_a_replay_of_a_stopped_trajectory_is_bit_equal():
     kept, start = Kept(), setup(q=tuple(BENT.tolist()))
     host = Host(Controller(start), kept)

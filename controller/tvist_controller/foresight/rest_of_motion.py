@@ -207,12 +207,15 @@ class RemainingMotion:
         before = collisions.declared
         escaping = self._cycle.mode.at_rest or collisions.meeting(q) is not None
         collisions.declare(payload)
-        met = None if escaping else collisions.meeting(q)
-        met = met or self.rest_of_way(tvist, parts)
-        if met is not None:
+        try:
+            met = None if escaping else collisions.meeting(q)
+            met = met or self.rest_of_way(tvist, parts)
+        finally:
             collisions.declare(before)
+        if met is not None:
             why = f"{met} on the rest of the path with this payload"
             raise RefusalError("collision", "com", why, CLEARANCE)
+        collisions.declare(payload)
 
     def check_filter(self, tvist: Filter) -> None:
         """Raise RefusalError if the rest of a motion whose joints are shaped would collide with another filter."""
@@ -238,9 +241,7 @@ class RemainingMotion:
 
     def _on(self, ahead: Floats | None) -> CloseBodies | None:
         """Return the first bodies too close along references, one per tick, shape (k, n), else None."""
-        if ahead is None:
+        if ahead is None or len(ahead) < 2:
             return None
-        steps = np.abs(np.diff(ahead, axis=0)).max(axis=0)
-        last = len(ahead) - 1
-        found = self._collisions.on_way(CheckedMotion(lambda share: ahead[round(share * last)], steps * last))
+        found = self._collisions.on_way(CheckedMotion.through(ahead))
         return None if found is None else found[1]

@@ -35,6 +35,12 @@ class CheckedMotion(NamedTuple):
     turned: Floats
     """Bound of each joint's turn, proportional for a part of the way, shape (n,) [rad]."""
 
+    @classmethod
+    def through(cls, samples: Floats) -> Self:
+        """Return the motion through at least two samples, one per tick, shape (k, n) [rad]."""
+        last, steps = len(samples) - 1, np.abs(np.diff(samples, axis=0)).max(axis=0)
+        return cls(lambda share: samples[round(share * last)], steps * last)
+
 
 class Path(ABC):
     """Joint positions q(x) as a function of a parameter x.
