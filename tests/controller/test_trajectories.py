@@ -141,6 +141,14 @@ def test_a_trajectory_that_needs_more_torque_than_a_joint_has_is_refused_with_po
     assert "joint shoulder would need a torque of" in reply.why
 
 
+def test_a_refusal_names_the_first_bad_point_before_and_after_shaping():
+    robot = Robot(plant=NoArm(), q=RAISED, shaper="none")
+    reply = robot.send(MoveTrajectory, points=swings((1.0, -0.9), (1.5, -0.4), (1.52, -0.9)))
+    assert (reply.code, reply.where) == ("limit_torque", "points[1]")
+    reply = robot.send(MoveTrajectory, points=swings((500.0, -0.9), (500.0, -0.4)))
+    assert reply.why == "points[1].time is 500 s: must be at least 0.1 ms after the point before"
+
+
 def test_the_way_between_ticks_is_as_smooth_as_the_checked_one():
     """A lower time rate plays it; the points' own curve turns by 0.3 rad and back between two ticks."""
     robot = Robot(plant=NoArm(), q=tuple(BENT))

@@ -1,6 +1,6 @@
 """Planning of trajectories through points at given times: played as they are, or refused."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -46,7 +46,7 @@ def check_points(command: MoveTrajectory, description: RobotDescription) -> None
     for number, point in enumerate(points):
         where = f"points[{number}]"
         if point.time < least:
-            must = f"at least {least:g} s, {GAP:g} s after the point before"
+            must = f"at least {1e3 * GAP:g} ms after the point before"
             raise invalid(f"{where}.time", f"{point.time:g} s", must, least)
         least = point.time + GAP
         for name in ("q", "qd", "qdd"):
@@ -84,8 +84,14 @@ class TrajectoryPlanner:
         rest = np.repeat(law.samples[-1:], len(tvist.window()), axis=0)
         shaped = tvist.filter_all(np.concatenate((law.samples, rest)))
         late = STANDING + round(tvist.delay / PERIOD)
-        self._check(command, law.samples, UNSHAPED, STANDING, now)
-        self._check(command, shaped, SHAPED, late, now, ", after shaping")
+        unshaped = self._faults(law.samples, UNSHAPED, STANDING, "", now)
+        faults = [*unshaped, *self._faults(shaped, SHAPED, late, "after shaping, ", now)]
+        if faults:
+            tick, late, code, why, limit = min(faults, key=lambda fault: fault[0])
+            time = max(tick - late, 0) * PERIOD
+            times = [point.time for point in command.points]
+            where = f"points[{min(int(np.searchsorted(times, time - SLACK)), len(times) - 1)}]"
+            raise RefusalError(code, where, f"{where}: {time:.3f} s after the start, {why}", limit)
         rate = rate_of(now.speed, limits.velocity, now.slowest)
         motion = PlannedMotion(path, law, rate, at_least(limits, AGILE.acceleration, AGILE.jerk))
         room = arms.velocity / limits.velocity, arms.acceleration / limits.acceleration
@@ -102,20 +108,13 @@ class TrajectoryPlanner:
             torques.append(np.abs(self._dynamics.torques(*states)))
         return np.max(torques, axis=0), 1
 
-    def _check(
-        self,
-        command: MoveTrajectory,
-        q: Floats,
-        names: Sequence[str],
-        late: int,
-        now: PlanningState,
-        how: str = "",
-    ) -> None:
-        """Refuse a trajectory at the first point at which it breaks one of the named limits or collides.
+    def _faults(
+        self, q: Floats, names: Sequence[str], late: int, how: str, now: PlanningState
+    ) -> Iterator[tuple[int, int, Code, str, float]]:
+        """Yield tick, `late`, code, reason and limit where positions first break each named limit, or collide.
 
-        Positions q, one per tick, have shape (t, n) [rad] and are so many ticks later than the points.
+        Positions q, one per tick, have shape (t, n) [rad] and start to move, on average, after `late` ticks.
         """
-        faults: list[tuple[int, Code, str, float]] = []
         limits, joints = self._description.limits, self._description.robot.joints
         for name in names:
             code, words, unit, remedy = _REFUSALS[name]
@@ -126,21 +125,14 @@ class TrajectoryPlanner:
                 continue
             row = int(np.argmax(beyond.any(axis=1)))
             joint = int(np.argmax(np.abs(values[row]) / most))
-            what = f"joint {joints[joint]} would {words} {values[row, joint]:.4g} {unit}"
+            what = f"{how}joint {joints[joint]} would {words} {values[row, joint]:.4g} {unit}"
             must = f"must be within ±{most[joint]:.4g} {unit}; {remedy}"
-            faults.append((row + first, code, f"{what}: {must}", float(most[joint])))
-        last, steps = len(q) - 1, np.abs(np.diff(q, axis=0)).max(axis=0)
-        found = self._moves.meeting(CheckedMotion(lambda share: q[round(share * last)], steps * last), now)
+            yield row + first, late, code, f"{what}: {must}", float(most[joint])
+        found = self._moves.meeting(CheckedMotion.through(q), now)
         if found is not None:
-            why = f"{found[1]}: choose points with another way between them"
-            faults.append((round(found[0] * last), "collision", why, CLEARANCE))
-        if not faults:
-            return
-        tick, code, why, limit = min(faults, key=lambda fault: fault[0])
-        time = max(tick - late, 0) * PERIOD
-        times = [point.time for point in command.points]
-        where = f"points[{min(int(np.searchsorted(times, time - SLACK)), len(times) - 1)}]"
-        raise RefusalError(code, where, f"{where}: {time:.3f} s after the start{how}, {why}", limit)
+            tick = round(found[0] * (len(q) - 1))
+            why = f"{how}{found[1]}: choose points with another way between them"
+            yield tick, late, "collision", why, CLEARANCE
 
 
 def _law(command: MoveTrajectory, now: PlanningState) -> PointLaw:
