@@ -149,6 +149,20 @@ def test_a_refusal_names_the_first_bad_point_before_and_after_shaping():
     assert reply.why == "points[1].time is 500 s: must be at least 0.1 ms after the point before"
 
 
+@pytest.mark.parametrize("moment", [205, 255, 905])
+def test_a_stop_near_the_torque_limits_is_quick_and_keeps_them(moment):
+    robot = Robot(plant=NoArm(), q=RAISED, shaper="none")
+    points = swings((0.7, -0.4), (1.4, -0.9), (2.1, -0.4), (2.8, -0.9))
+    assert isinstance(robot.send(MoveTrajectory, points=points), Accepted)
+    robot.tick(moment)
+    robot.send(c.Stop)
+    robot.until_rest()
+    stopped = robot.column("target_q")[moment - 2 :]
+    assert (np.abs(torques(UR5E, paper_payload(UR5E), stopped)).max(axis=0) <= LIMITS.torque).all()
+    assert stopped[:, 1].max() - stopped[-1, 1] < 0.02  # it hardly swings back
+    assert H * resting_after(stopped) < 0.6
+
+
 def test_the_way_between_ticks_is_as_smooth_as_the_checked_one():
     """A lower time rate plays it; the points' own curve turns by 0.3 rad and back between two ticks."""
     robot = Robot(plant=NoArm(), q=tuple(BENT))

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tvist_controller.foresight.stops import MAX_AHEAD, LineSimulation, StopPlan, StopPlanner
+from tvist_controller.foresight.stops import LONG_STOP, MAX_AHEAD, LineSimulation, StopPlan, StopPlanner
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.limits import torque_along
@@ -15,7 +15,6 @@ from tvist_controller.trajectory import AnyStop, BrakingForecast, Path, StuckErr
 from tvist_plant.plant import PERIOD
 from tvist_shaping.base import Filter
 
-LONG_STOP = 0.2  # duration above which slower playback along a curve is tried as a stop [s]
 EVEN = 1e-12  # differences between steps below this are rounding errors [rad]
 
 
