@@ -17,7 +17,7 @@ from tvist_plant.description import Payload
 from tvist_plant.plant import PERIOD
 from tvist_shaping.base import Filter
 
-FORESEEN = 2000  # largest number of ticks of the rest of a trajectory that is simulated with the filter
+FORESEEN = 2000  # ticks of the rest of a trajectory up to which it is checked shaped too, by simulation
 MARGIN = 0.8
 """Fraction of the acceleration that torque permits at the start of a stop; the margin is for changes on the way [-]."""
 

@@ -116,7 +116,7 @@ class Stopper:
         return None if stopping else runs_out
 
     def _on_curve(self, path: Path, deceleration: float | None) -> StopPlan | None:
-        """Slow the time of a motion down, of which only the simulation knows the shaped way."""
+        """Stop a motion on a curve by slowing its time down along the shaped way, which is simulated."""
         cycle, stopping = self._cycle, self._cycle.mode is LineMode.STOPPING
         ahead = LineSimulation(*cycle.fork())
         stop = self.stops.on_curve(ahead, cycle.along.published, path, deceleration)

@@ -77,7 +77,7 @@ HARDER = 1.05
 """Factor by which a stop must brake harder than the motion to be never ahead of it, since a varying filter
 may brake slightly harder than its reference [-]."""
 TURN_BACK_SPEED = 3e-3  # speed below which interpolation may turn a shaped motion back slightly [rad/s]
-SLOW = 0.05  # speed below which a motion's time stops as if it had this speed [rad/s]
+SLOW = 0.05  # least speed in calculations of stops on a curve, so that no slow motion stops abruptly [rad/s]
 LONG_STOP = 0.2  # duration above which a quicker stop is sought with more calculation [s]
 SOFT = (20.0, 10.0)  # jerks of the last stops tried, which torque at its limit still permits [rad/s^3]
 SOON = 0.02  # a motion that brakes later than this is by then ahead of a stop [s]
@@ -206,24 +206,20 @@ class StopPlanner:
             samples = np.array(ahead.samples)
             return SlowedStop(path, samples, acceleration=acceleration, jerk=jerk, fastest=fastest)
 
-        def quickest(asked: Floats | None) -> SlowedStop | None:
-            torque = StopTorque(self._dynamics, state, self._torque, asked)
+        def quickest(torque: StopTorque) -> SlowedStop | None:
             stops = (made for made in starmap(stop, tries) if made.hardest <= self.highest)
-
-            def holds(made: SlowedStop, rebound: bool) -> bool:
-                return torque.holds(made, rebound=rebound) and torque.excess(made) <= 1.0
-
-            return _first(stops, holds)
+            within = (made for made in stops if torque.excess(made) <= 1.0)
+            return _first(within, lambda made, rebound: torque.holds(made, rebound=rebound))
 
         ahead.until(2)
         if len(ahead.samples) < 4:
             return None
-        found = quickest(None)
+        found = quickest(StopTorque(self._dynamics, state, self._torque))
         if found is not None and found.duration <= LONG_STOP:
             return found
         asked = torque_along(self._dynamics, np.array(ahead.references))
         torque = StopTorque(self._dynamics, state, self._torque, asked)
-        return quickest(asked) or min(starmap(stop, tries), key=torque.excess)
+        return quickest(torque) or min(starmap(stop, tries), key=torque.excess)
 
     def _behind(self, stop: PathStop | SlowedStop, along: Sequence[float]) -> bool:
         """Return whether a stop is never ahead of a motion; `along` is the motion's distance at each tick."""

@@ -4,7 +4,6 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
-from msgspec.structs import replace
 
 from tvist_controller.foresight.collision import CLEARANCE
 from tvist_controller.kinematics.arm import InverseDynamics
@@ -20,7 +19,7 @@ from tvist_controller.trajectory import CheckedMotion, JointCurve, PlannedMotion
 from tvist_controller.trajectory.points import STANDING
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
-from tvist_protocol.motions import MoveTrajectory, TrajectoryPoint
+from tvist_protocol.motions import MoveTrajectory
 from tvist_protocol.replies import Code
 
 NEAR = 0.01  # largest distance of a first point at time 0 from the present reference [rad]
@@ -137,16 +136,14 @@ class TrajectoryPlanner:
 
 def _law(command: MoveTrajectory, now: PlanningState) -> PointLaw:
     """Return the interpolation from the present reference; refuse a first point that is not there."""
-    (first, *points), here = command.points, tuple(now.q.tolist())
-    if first.time > 0.0:
-        still = (0.0,) * len(here)
-        points = [TrajectoryPoint(time=0.0, q=here, qd=still, qdd=still), first, *points]
-    else:
-        for joint, (angle, start) in enumerate(zip(first.q, here, strict=True)):
-            if abs(angle - start) > NEAR:
-                must = f"within {NEAR:g} rad of {start:.4f}, where the arm is: begin there, or give it a later time"
-                raise invalid(f"points[0].q[{joint}]", f"{angle:.4f} rad", must, NEAR)
-        points = [replace(first, q=here), *points]
-    columns = ([getattr(point, name) for point in points] for name in ("time", "q", "qd", "qdd"))
-    arrays: list[Any] = [None if column[-1] is None else np.array(column) for column in columns]
+    columns = ([getattr(point, name) for point in command.points] for name in ("time", "q", "qd", "qdd"))
+    arrays: list[Any] = [None if column[0] is None else np.array(column) for column in columns]
+    times, q, *_ = arrays
+    if times[0] > 0.0:  # the start is no point: add it, at rest
+        arrays = [None if array is None else np.insert(array, 0, 0.0, axis=0) for array in arrays]
+    elif (far := np.abs(q[0] - now.q) > NEAR).any():
+        joint = int(np.argmax(far))
+        must = f"within {NEAR:g} rad of {now.q[joint]:.4f}, where the arm is: begin there, or give it a later time"
+        raise invalid(f"points[0].q[{joint}]", f"{q[0, joint]:.4f} rad", must, NEAR)
+    arrays[1][0] = now.q
     return PointLaw(*arrays)

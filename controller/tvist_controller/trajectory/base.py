@@ -123,7 +123,7 @@ class JointLine(Path):
 
 
 class JointCurve(JointLine):
-    """A way between two postures that the time law knows; filter and stops act on the joints, as on a line."""
+    """Curve between two postures, known to the time law alone; filter and stops act on each joint, as on a line."""
 
     curved = True
 
