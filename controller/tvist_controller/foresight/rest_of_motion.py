@@ -12,7 +12,7 @@ from tvist_controller.line.differentiator import Floats, Target
 from tvist_controller.line.limits import GENTLEST_STOP, StreamTorqueMargin
 from tvist_controller.line.line_mode import Guard, Obstacle
 from tvist_controller.refusal import RefusalError
-from tvist_controller.trajectory import CheckedMotion, JointStop, PlannedMotion, PointLaw
+from tvist_controller.trajectory import CheckedMotion, JointStop, PlannedMotion, TimedMotion
 from tvist_plant.description import Payload
 from tvist_plant.plant import PERIOD
 from tvist_shaping.base import Filter
@@ -182,10 +182,10 @@ class RemainingMotion:
         trajectory = cycle.trajectory
         if (forecast := trajectory.forecast) is not None:
             return self._first([forecast.path.way(cycle.along.position, forecast.end), *coming])
-        if isinstance(trajectory, PlannedMotion) and isinstance(law := trajectory.law, PointLaw):
+        if isinstance(trajectory, TimedMotion):
             going_on = trajectory.fork()
             going_on.release(1.0)  # a pause may end
-            left = law.after(max(trajectory.time - cycle.tvist.delay, 0.0))
+            left = trajectory.law.after(max(trajectory.time - cycle.tvist.delay, 0.0))
             return self._on(left) or self._on(
                 self._stopper.simulate_until_rest(tvist, going_on) if len(left) < FORESEEN else None
             )
@@ -220,7 +220,7 @@ class RemainingMotion:
     def check_filter(self, tvist: Filter) -> None:
         """Raise RefusalError if the rest of a motion whose joints are shaped would collide with another filter."""
         cycle, trajectory = self._cycle, self._cycle.trajectory
-        curved = trajectory.path is not None and trajectory.path.curved
+        curved = trajectory.path is not None and trajectory.forecast is None
         if not ((cycle.mode.guarded or curved) and trajectory.foreseeable):
             return
         met = self.rest_of_way(tvist, ())  # such motions have no parts

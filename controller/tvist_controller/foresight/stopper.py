@@ -68,9 +68,9 @@ class Stopper:
     def plan_stop(self, deceleration: float | None) -> StopPlan | None:
         """Return the quickest permitted stop from the present state without starting it; see `stop`."""
         forecast, path = self._cycle.trajectory.forecast, self._cycle.trajectory.path
-        if path is not None and path.curved:
-            return self._on_curve(path, deceleration)
-        return self._by_joints(deceleration) if forecast is None else self._on_path(forecast, deceleration)
+        if forecast is not None:
+            return self._on_path(forecast, deceleration)
+        return self._by_joints(deceleration) if path is None else self._on_curve(path, deceleration)
 
     def _by_joints(self, deceleration: float | None) -> StopPlan | None:
         cycle, guard, present = self._cycle, self._cycle.guard, self._cycle.trajectory

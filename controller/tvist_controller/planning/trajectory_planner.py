@@ -15,7 +15,7 @@ from tvist_controller.planning.move_planner import AGILE, MovePlanner, PlannedMo
 from tvist_controller.planning.snapshot import PlanningState
 from tvist_controller.refusal import RefusalError, invalid, missing
 from tvist_controller.setup import Setup, body
-from tvist_controller.trajectory import CheckedMotion, JointCurve, PlannedMotion, PointLaw, at_least
+from tvist_controller.trajectory import CheckedMotion, JointLine, PointLaw, TimedMotion, at_least
 from tvist_controller.trajectory.points import STANDING
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
@@ -76,7 +76,7 @@ class TrajectoryPlanner:
     def plan(self, command: MoveTrajectory, now: PlanningState) -> PlannedMove:
         """Plan a trajectory from rest, or refuse it at the first point that breaks a limit."""
         law = _law(command, now)
-        path, limits, arms = JointCurve(now.q, law.samples[-1]), law.limits, arm_limits(self._description)
+        path, limits, arms = JointLine(now.q, law.samples[-1]), law.limits, arm_limits(self._description)
         tvist = self._filters.like(now.filter)
         tvist.reset(now.q)
         tvist.aim(path.end)
@@ -92,7 +92,7 @@ class TrajectoryPlanner:
             where = f"points[{min(int(np.searchsorted(times, time - SLACK)), len(times) - 1)}]"
             raise RefusalError(code, where, f"{where}: {time:.3f} s after the start, {why}", limit)
         rate = rate_of(now.speed, limits.velocity, now.slowest)
-        motion = PlannedMotion(path, law, rate, at_least(limits, AGILE.acceleration, AGILE.jerk))
+        motion = TimedMotion(path, law, rate, at_least(limits, AGILE.acceleration, AGILE.jerk))
         room = arms.velocity / limits.velocity, arms.acceleration / limits.acceleration
         return PlannedMove((motion,), limits.velocity, None, room=room, excess_at_limits=now.excess_at_limits)
 

@@ -52,8 +52,6 @@ class Path(ABC):
 
     posture_of: Posture | None
     """Function from parameter to joint positions; None if they are the same."""
-    curved = False
-    """Whether the parameter does not go straight, so that only its time law knows the way."""
 
     def __init__(self, start: Floats, end: Floats) -> None:
         self.start, self.end = start, np.array(end, dtype=float)
@@ -122,12 +120,6 @@ class JointLine(Path):
         return CheckedMotion(lambda share: start + share * way, way)
 
 
-class JointCurve(JointLine):
-    """Curve between two postures, known to the time law alone; filter and stops act on each joint, as on a line."""
-
-    curved = True
-
-
 @dataclass(frozen=True)
 class BrakingForecast:
     """When and how hard a trajectory will brake, in its path's parameter, as known without simulation."""
@@ -174,7 +166,7 @@ class Trajectory(ABC):
 
     @property
     def forecast(self) -> BrakingForecast | None:
-        """Forecast of the motion; None without a path."""
+        """Forecast of the motion; None without a path, or on a curve of each joint."""
         return None
 
     def fork(self) -> Self:

@@ -205,8 +205,8 @@ class SlowedStop(Trajectory):
 
     @property
     def forecast(self) -> BrakingForecast | None:
-        """BrakingForecast of its motion, which brakes from the start; None on a curve."""
-        if self.path.curved:
+        """BrakingForecast of its motion, which brakes from the start; None on a curve of each joint."""
+        if self.path.posture_of is None:
             return None
         along = self._samples[:, self.path.leading]
         braking, jerk = (
