@@ -175,8 +175,9 @@ class MoveTrajectory(Leased, frozen=True, kw_only=True, tag="move_trajectory"):
     """
 
     points: Annotated[tuple[TrajectoryPoint, ...], Meta(min_length=1, max_length=MAX_POINTS)]
-    """Points in order, all with the same fields; a message has room for 1300 of six joints with accelerations. The
-    trajectory starts at rest at the present reference: a first point at time 0 must be within 0.01 rad of it."""
+    """Points in order, all with the same fields; a message has room for 2000 of six joints with velocities, for 1300
+    with accelerations. The trajectory starts at rest at the present reference: a first point at time 0 must be within
+    0.01 rad of it."""
 
 
 class ServoJ(Leased, frozen=True, kw_only=True, tag="servo_j"):

@@ -25,6 +25,7 @@ from tvist_protocol.simulation import SimulationInject, SimulationReset
 from .robots import Q1, UR5E, H, Kept, NoArm, Robot, setup
 
 STILL = (0.0,) * 6
+RAISED = (0.0, -0.9, 0.0, -1.57, 0.0, 0.0)
 KINDS = ("linear", "cubic", "quintic")
 LIMITS = UR5E.limits
 EACH_JOINT = (
@@ -126,15 +127,53 @@ def alone(shaper):
     return robot.column("target_q")
 
 
-def test_a_trajectory_that_needs_more_torque_than_a_joint_has_is_refused_with_point_and_joint():
-    robot = Robot(plant=NoArm(), q=(0.0, -0.9, 0.0, -1.57, 0.0, 0.0), shaper="none")
-    points = tuple(
-        TrajectoryPoint(time=time, q=(0.0, turn, 0.0, -1.57, 0.0, 0.0), qd=STILL, qdd=STILL)
-        for time, turn in ((1.0, -0.9), (1.5, -0.4))
+def swings(*turns):
+    """Return points at rest at given times and shoulder angles, from the raised posture."""
+    return tuple(
+        TrajectoryPoint(time=time, q=(0.0, turn, *RAISED[2:]), qd=STILL, qdd=STILL) for time, turn in turns
     )
-    reply = robot.send(MoveTrajectory, points=points)
+
+
+def test_a_trajectory_that_needs_more_torque_than_a_joint_has_is_refused_with_point_and_joint():
+    robot = Robot(plant=NoArm(), q=RAISED, shaper="none")
+    reply = robot.send(MoveTrajectory, points=swings((1.0, -0.9), (1.5, -0.4)))
     assert (reply.code, reply.where, reply.limit) == ("limit_torque", "points[1]", LIMITS.torque[1])
     assert "joint shoulder would need a torque of" in reply.why
+
+
+def test_a_refusal_names_the_first_bad_point_before_and_after_shaping():
+    robot = Robot(plant=NoArm(), q=RAISED, shaper="none")
+    reply = robot.send(MoveTrajectory, points=swings((1.0, -0.9), (1.5, -0.4), (1.52, -0.9)))
+    assert (reply.code, reply.where) == ("limit_torque", "points[1]")
+    reply = robot.send(MoveTrajectory, points=swings((500.0, -0.9), (500.0, -0.4)))
+    assert reply.why == "points[1].time is 500 s: must be at least 0.1 ms after the point before"
+
+
+@pytest.mark.parametrize("moment", [205, 255, 905])
+def test_a_stop_near_the_torque_limits_is_quick_and_keeps_them(moment):
+    robot = Robot(plant=NoArm(), q=RAISED, shaper="none")
+    points = swings((0.7, -0.4), (1.4, -0.9), (2.1, -0.4), (2.8, -0.9))
+    assert isinstance(robot.send(MoveTrajectory, points=points), Accepted)
+    robot.tick(moment)
+    robot.send(c.Stop)
+    robot.until_rest()
+    stopped = robot.column("target_q")[moment - 2 :]
+    assert (np.abs(torques(UR5E, paper_payload(UR5E), stopped)).max(axis=0) <= LIMITS.torque).all()
+    assert stopped[:, 1].max() - stopped[-1, 1] < 0.02  # it hardly swings back
+    assert H * resting_after(stopped) < 0.6
+
+
+def test_the_way_between_ticks_is_as_smooth_as_the_checked_one():
+    """A lower time rate plays it; the points' own curve turns by 0.3 rad and back between two ticks."""
+    robot = Robot(plant=NoArm(), q=tuple(BENT))
+    turns = ((0.5, 0.0), (0.5 + H / 2, 0.3), (0.5 + H, 0.0), (1.5, 0.05))
+    points = tuple(
+        TrajectoryPoint(time=time, q=(*BENT[:5], BENT[5] + turn), qd=STILL) for time, turn in turns
+    )
+    assert isinstance(robot.send(MoveTrajectory, points=points), Accepted)
+    assert robot.send(c.SetSpeed, fraction=0.37) == Done()
+    robot.until_rest()
+    assert np.abs(np.diff(robot.column("target_q"), axis=0)).max() / H < 0.08
 
 
 def places(way, positions):
@@ -229,6 +268,20 @@ def test_a_change_of_payload_or_shaper_is_checked_on_the_rest_of_the_way(seconds
     rod = {"mass": 1.0, "com": (0.0, 0.0, 0.3), "inertia": (0.01, 0.0, 0.0, 0.01, 0.0, 0.01)}
     assert robot.send(c.SetPayload, **rod).code == "collision"
     assert robot.send(c.SetShaper, name="zvd") == Done()
+
+
+def test_payload_and_shaper_change_at_any_tick_of_the_shaped_end_of_a_trajectory():
+    robot = Robot(plant=NoArm(), q=tuple(BENT), shaper="um_zv", calibration=load("ur5e_modal"))
+    point = TrajectoryPoint(time=0.5, q=tuple(BENT + 0.2), qd=STILL)
+    assert isinstance(robot.send(MoveTrajectory, points=(point,)), Accepted)
+    robot.tick(240)
+    weight = {"mass": 1.0, "com": (0.0, 0.0, 0.03), "inertia": (0.01, 0.0, 0.0, 0.01, 0.0, 0.01)}
+    for _ in range(80):
+        robot.tick()
+        assert robot.send(c.SetPayload, **weight) == Done()
+        assert robot.send(c.SetShaper, name="um_zv") == Done()
+    robot.until_rest()
+    assert motions(robot) == ["motion_started", "motion_done"]
 
 
 def test_a_replay_of_a_stopped_trajectory_is_bit_equal():

@@ -12,12 +12,12 @@ from tvist_controller.line.differentiator import Floats, Target
 from tvist_controller.line.limits import GENTLEST_STOP, StreamTorqueMargin
 from tvist_controller.line.line_mode import Guard, Obstacle
 from tvist_controller.refusal import RefusalError
-from tvist_controller.trajectory import CheckedMotion, JointStop, PlannedMotion, PointLaw
+from tvist_controller.trajectory import CheckedMotion, JointStop, PlannedMotion, TimedMotion
 from tvist_plant.description import Payload
 from tvist_plant.plant import PERIOD
 from tvist_shaping.base import Filter
 
-FORESEEN = 2000  # largest number of ticks of the rest of a trajectory that is simulated with the filter
+FORESEEN = 2000  # ticks of the rest of a trajectory up to which it is checked shaped too, by simulation
 MARGIN = 0.8
 """Fraction of the acceleration that torque permits at the start of a stop; the margin is for changes on the way [-]."""
 
@@ -182,10 +182,10 @@ class RemainingMotion:
         trajectory = cycle.trajectory
         if (forecast := trajectory.forecast) is not None:
             return self._first([forecast.path.way(cycle.along.position, forecast.end), *coming])
-        if isinstance(trajectory, PlannedMotion) and isinstance(law := trajectory.law, PointLaw):
+        if isinstance(trajectory, TimedMotion):
             going_on = trajectory.fork()
             going_on.release(1.0)  # a pause may end
-            left = law.after(max(trajectory.time - cycle.tvist.delay, 0.0))
+            left = trajectory.law.after(max(trajectory.time - cycle.tvist.delay, 0.0))
             return self._on(left) or self._on(
                 self._stopper.simulate_until_rest(tvist, going_on) if len(left) < FORESEEN else None
             )
@@ -207,17 +207,20 @@ class RemainingMotion:
         before = collisions.declared
         escaping = self._cycle.mode.at_rest or collisions.meeting(q) is not None
         collisions.declare(payload)
-        met = None if escaping else collisions.meeting(q)
-        met = met or self.rest_of_way(tvist, parts)
-        if met is not None:
+        try:
+            met = None if escaping else collisions.meeting(q)
+            met = met or self.rest_of_way(tvist, parts)
+        finally:
             collisions.declare(before)
+        if met is not None:
             why = f"{met} on the rest of the path with this payload"
             raise RefusalError("collision", "com", why, CLEARANCE)
+        collisions.declare(payload)
 
     def check_filter(self, tvist: Filter) -> None:
         """Raise RefusalError if the rest of a motion whose joints are shaped would collide with another filter."""
         cycle, trajectory = self._cycle, self._cycle.trajectory
-        curved = trajectory.path is not None and trajectory.path.curved
+        curved = trajectory.path is not None and trajectory.forecast is None
         if not ((cycle.mode.guarded or curved) and trajectory.foreseeable):
             return
         met = self.rest_of_way(tvist, ())  # such motions have no parts
@@ -238,9 +241,7 @@ class RemainingMotion:
 
     def _on(self, ahead: Floats | None) -> CloseBodies | None:
         """Return the first bodies too close along references, one per tick, shape (k, n), else None."""
-        if ahead is None:
+        if ahead is None or len(ahead) < 2:
             return None
-        steps = np.abs(np.diff(ahead, axis=0)).max(axis=0)
-        last = len(ahead) - 1
-        found = self._collisions.on_way(CheckedMotion(lambda share: ahead[round(share * last)], steps * last))
+        found = self._collisions.on_way(CheckedMotion.through(ahead))
         return None if found is None else found[1]

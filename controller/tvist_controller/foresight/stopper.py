@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tvist_controller.foresight.stops import MAX_AHEAD, LineSimulation, StopPlan, StopPlanner
+from tvist_controller.foresight.stops import LONG_STOP, MAX_AHEAD, LineSimulation, StopPlan, StopPlanner
 from tvist_controller.line.cycle import ControlCycle
 from tvist_controller.line.differentiator import Floats
 from tvist_controller.line.limits import torque_along
@@ -15,7 +15,6 @@ from tvist_controller.trajectory import AnyStop, BrakingForecast, Path, StuckErr
 from tvist_plant.plant import PERIOD
 from tvist_shaping.base import Filter
 
-LONG_STOP = 0.2  # duration above which slower playback along a curve is tried as a stop [s]
 EVEN = 1e-12  # differences between steps below this are rounding errors [rad]
 
 
@@ -69,9 +68,9 @@ class Stopper:
     def plan_stop(self, deceleration: float | None) -> StopPlan | None:
         """Return the quickest permitted stop from the present state without starting it; see `stop`."""
         forecast, path = self._cycle.trajectory.forecast, self._cycle.trajectory.path
-        if path is not None and path.curved:
-            return self._on_curve(path, deceleration)
-        return self._by_joints(deceleration) if forecast is None else self._on_path(forecast, deceleration)
+        if forecast is not None:
+            return self._on_path(forecast, deceleration)
+        return self._by_joints(deceleration) if path is None else self._on_curve(path, deceleration)
 
     def _by_joints(self, deceleration: float | None) -> StopPlan | None:
         cycle, guard, present = self._cycle, self._cycle.guard, self._cycle.trajectory
@@ -117,7 +116,7 @@ class Stopper:
         return None if stopping else runs_out
 
     def _on_curve(self, path: Path, deceleration: float | None) -> StopPlan | None:
-        """Slow the time of a motion down, of which only the simulation knows the shaped way."""
+        """Stop a motion on a curve by slowing its time down along the shaped way, which is simulated."""
         cycle, stopping = self._cycle, self._cycle.mode is LineMode.STOPPING
         ahead = LineSimulation(*cycle.fork())
         stop = self.stops.on_curve(ahead, cycle.along.published, path, deceleration)

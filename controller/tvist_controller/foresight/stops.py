@@ -7,13 +7,14 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
+from itertools import starmap
 from typing import TypeVar
 
 import numpy as np
 
 from tvist_controller.kinematics.arm import InverseDynamics
 from tvist_controller.line.differentiator import STILL, Floats, ShapedReference, Target, rests_at
-from tvist_controller.line.limits import GENTLEST_STOP, StopTorque
+from tvist_controller.line.limits import GENTLEST_STOP, StopTorque, torque_along
 from tvist_controller.line.line_filter import LineFilter
 from tvist_controller.trajectory import (
     AnyStop,
@@ -76,7 +77,9 @@ HARDER = 1.05
 """Factor by which a stop must brake harder than the motion to be never ahead of it, since a varying filter
 may brake slightly harder than its reference [-]."""
 TURN_BACK_SPEED = 3e-3  # speed below which interpolation may turn a shaped motion back slightly [rad/s]
-SLOW = 0.05  # speed below which a motion's time stops as if it had this speed [rad/s]
+SLOW = 0.05  # least speed in calculations of stops on a curve, so that no slow motion stops abruptly [rad/s]
+LONG_STOP = 0.2  # duration above which a quicker stop is sought with more calculation [s]
+SOFT = (20.0, 10.0)  # jerks of the last stops tried, which torque at its limit still permits [rad/s^3]
 SOON = 0.02  # a motion that brakes later than this is by then ahead of a stop [s]
 COUNTED = 0.9  # fraction of its velocity that a motion is assumed to keep until it brakes [-]
 ROUNDING = 1e-12  # position differences below this are rounding errors [rad]
@@ -188,25 +191,35 @@ class StopPlanner:
     def on_curve(
         self, ahead: LineSimulation, state: Target, path: Path, wanted: float | None
     ) -> SlowedStop | None:
-        """Return the quickest `SlowedStop` within the limits, else the gentlest; None for a motion about to rest.
+        """Return the quickest `SlowedStop` within the limits, else the one that exceeds them least.
 
-        Arguments as in `under`; the motion is simulated as far as the stops need it.
+        None for a motion about to rest. Arguments as in `under`; the motion is simulated as far as the stops need it.
         """
-        fastest, jerk = max(float(np.abs(state.qd).max()), SLOW), 0.5 * self.jerk
-        torque = StopTorque(self._dynamics, state, self._torque)
+        fastest = max(float(np.abs(state.qd).max()), SLOW)
+        tries = [(acceleration, 0.5 * self.jerk) for acceleration in self._ladder(wanted)]
+        tries += [(tries[0][0], jerk) for jerk in SOFT]
 
-        def stop(acceleration: float) -> SlowedStop:
-            longest = fastest / acceleration + acceleration / jerk
-            ahead.until(math.ceil(longest / PERIOD) + 2)
+        @cache
+        def stop(acceleration: float, jerk: float) -> SlowedStop:
+            reached = min(acceleration, math.sqrt(fastest * jerk))
+            ahead.until(math.ceil((fastest / reached + reached / jerk) / PERIOD) + 2)
             samples = np.array(ahead.samples)
             return SlowedStop(path, samples, acceleration=acceleration, jerk=jerk, fastest=fastest)
+
+        def quickest(torque: StopTorque) -> SlowedStop | None:
+            stops = (made for made in starmap(stop, tries) if made.hardest <= self.highest)
+            within = (made for made in stops if torque.excess(made) <= 1.0)
+            return _first(within, lambda made, rebound: torque.holds(made, rebound=rebound))
 
         ahead.until(2)
         if len(ahead.samples) < 4:
             return None
-        stops = (made for made in map(stop, self._ladder(wanted)) if made.hardest <= self.highest)
-        held = _first(stops, lambda stop, rebound: torque.holds(stop, rebound=rebound))
-        return stop(GENTLEST_STOP) if held is None else held
+        found = quickest(StopTorque(self._dynamics, state, self._torque))
+        if found is not None and found.duration <= LONG_STOP:
+            return found
+        asked = torque_along(self._dynamics, np.array(ahead.references))
+        torque = StopTorque(self._dynamics, state, self._torque, asked)
+        return quickest(torque) or min(starmap(stop, tries), key=torque.excess)
 
     def _behind(self, stop: PathStop | SlowedStop, along: Sequence[float]) -> bool:
         """Return whether a stop is never ahead of a motion; `along` is the motion's distance at each tick."""

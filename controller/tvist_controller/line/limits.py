@@ -11,7 +11,7 @@ from tvist_controller.line.differentiator import Floats, Target, central_differe
 from tvist_controller.trajectory import AnyStop, MotionLimits, Path
 from tvist_plant.chain import collect_inertia, torques
 from tvist_plant.description import RobotDescription
-from tvist_plant.plant import GRAVITY
+from tvist_plant.plant import GRAVITY, PERIOD
 
 TORQUE_SHARE = 0.9
 """Fraction of the joint torque limits available to a stop or stream [-]."""
@@ -150,21 +150,30 @@ class StopTorque:
 
     def _within(self, stop: AnyStop, times: Floats, *, rebound: bool) -> npt.NDArray[np.bool_]:
         """Return at which of k times a stop keeps the torques, shape (k,)."""
-        dynamics = self._dynamics
-        q, qd, qdd = stop.states(times)
-        torque = dynamics.torques(q, qd, qdd)
-        effort = np.abs(torque)
-        if dynamics.changing:
-            effort = np.array([dynamics.effort(*state) for state in zip(q, qd, qdd, strict=True)])
+        q, torque, effort = self._torques(stop, times)
         within = np.asarray((effort <= self._share).all(axis=1))
         if not rebound or not within.any():
             return within
-        gravity = dynamics.gravities(q)
+        gravity = self._dynamics.gravities(q)
         motion = torque - gravity
         begun = np.abs(torque + REBOUND * (motion - self._before))
         ended = np.abs(gravity - REBOUND * motion)
         within &= (np.maximum(begun, ended) <= self._most).all(axis=1)
         return within
+
+    def excess(self, stop: AnyStop) -> float:
+        """Return the largest ratio of a torque at any tick of a stop to what `holds` permits [-]."""
+        times = PERIOD * np.arange(1.0, math.ceil(stop.duration / PERIOD) + 1.0)
+        return float((self._torques(stop, times)[2] / self._share).max(initial=0.0))
+
+    def _torques(self, stop: AnyStop, times: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return positions, torques and largest absolute torques of any body at k times, each (k, n)."""
+        dynamics, (q, qd, qdd) = self._dynamics, stop.states(times)
+        torque = dynamics.torques(q, qd, qdd)
+        if not dynamics.changing:
+            return q, torque, np.abs(torque)
+        effort = [dynamics.effort(*state) for state in zip(q, qd, qdd, strict=True)]
+        return q, torque, np.array(effort)
 
 
 def acceleration_on_way(

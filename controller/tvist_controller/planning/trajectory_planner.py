@@ -1,10 +1,9 @@
 """Planning of trajectories through points at given times: played as they are, or refused."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
-from msgspec.structs import replace
 
 from tvist_controller.foresight.collision import CLEARANCE
 from tvist_controller.kinematics.arm import InverseDynamics
@@ -16,11 +15,11 @@ from tvist_controller.planning.move_planner import AGILE, MovePlanner, PlannedMo
 from tvist_controller.planning.snapshot import PlanningState
 from tvist_controller.refusal import RefusalError, invalid, missing
 from tvist_controller.setup import Setup, body
-from tvist_controller.trajectory import CheckedMotion, JointCurve, PlannedMotion, PointLaw, at_least
+from tvist_controller.trajectory import CheckedMotion, JointLine, PointLaw, TimedMotion, at_least
 from tvist_controller.trajectory.points import STANDING
 from tvist_plant.description import RobotDescription
 from tvist_plant.plant import PERIOD
-from tvist_protocol.motions import MoveTrajectory, TrajectoryPoint
+from tvist_protocol.motions import MoveTrajectory
 from tvist_protocol.replies import Code
 
 NEAR = 0.01  # largest distance of a first point at time 0 from the present reference [rad]
@@ -46,7 +45,7 @@ def check_points(command: MoveTrajectory, description: RobotDescription) -> None
     for number, point in enumerate(points):
         where = f"points[{number}]"
         if point.time < least:
-            must = f"at least {least:g} s, {GAP:g} s after the point before"
+            must = f"at least {1e3 * GAP:g} ms after the point before"
             raise invalid(f"{where}.time", f"{point.time:g} s", must, least)
         least = point.time + GAP
         for name in ("q", "qd", "qdd"):
@@ -77,17 +76,23 @@ class TrajectoryPlanner:
     def plan(self, command: MoveTrajectory, now: PlanningState) -> PlannedMove:
         """Plan a trajectory from rest, or refuse it at the first point that breaks a limit."""
         law = _law(command, now)
-        path, limits, arms = JointCurve(now.q, law.samples[-1]), law.limits, arm_limits(self._description)
+        path, limits, arms = JointLine(now.q, law.samples[-1]), law.limits, arm_limits(self._description)
         tvist = self._filters.like(now.filter)
         tvist.reset(now.q)
         tvist.aim(path.end)
         rest = np.repeat(law.samples[-1:], len(tvist.window()), axis=0)
         shaped = tvist.filter_all(np.concatenate((law.samples, rest)))
         late = STANDING + round(tvist.delay / PERIOD)
-        self._check(command, law.samples, UNSHAPED, STANDING, now)
-        self._check(command, shaped, SHAPED, late, now, ", after shaping")
+        unshaped = self._faults(law.samples, UNSHAPED, STANDING, "", now)
+        faults = [*unshaped, *self._faults(shaped, SHAPED, late, "after shaping, ", now)]
+        if faults:
+            tick, late, code, why, limit = min(faults, key=lambda fault: fault[0])
+            time = max(tick - late, 0) * PERIOD
+            times = [point.time for point in command.points]
+            where = f"points[{min(int(np.searchsorted(times, time - SLACK)), len(times) - 1)}]"
+            raise RefusalError(code, where, f"{where}: {time:.3f} s after the start, {why}", limit)
         rate = rate_of(now.speed, limits.velocity, now.slowest)
-        motion = PlannedMotion(path, law, rate, at_least(limits, AGILE.acceleration, AGILE.jerk))
+        motion = TimedMotion(path, law, rate, at_least(limits, AGILE.acceleration, AGILE.jerk))
         room = arms.velocity / limits.velocity, arms.acceleration / limits.acceleration
         return PlannedMove((motion,), limits.velocity, None, room=room, excess_at_limits=now.excess_at_limits)
 
@@ -102,20 +107,13 @@ class TrajectoryPlanner:
             torques.append(np.abs(self._dynamics.torques(*states)))
         return np.max(torques, axis=0), 1
 
-    def _check(
-        self,
-        command: MoveTrajectory,
-        q: Floats,
-        names: Sequence[str],
-        late: int,
-        now: PlanningState,
-        how: str = "",
-    ) -> None:
-        """Refuse a trajectory at the first point at which it breaks one of the named limits or collides.
+    def _faults(
+        self, q: Floats, names: Sequence[str], late: int, how: str, now: PlanningState
+    ) -> Iterator[tuple[int, int, Code, str, float]]:
+        """Yield tick, `late`, code, reason and limit where positions first break each named limit, or collide.
 
-        Positions q, one per tick, have shape (t, n) [rad] and are so many ticks later than the points.
+        Positions q, one per tick, have shape (t, n) [rad] and start to move, on average, after `late` ticks.
         """
-        faults: list[tuple[int, Code, str, float]] = []
         limits, joints = self._description.limits, self._description.robot.joints
         for name in names:
             code, words, unit, remedy = _REFUSALS[name]
@@ -126,35 +124,26 @@ class TrajectoryPlanner:
                 continue
             row = int(np.argmax(beyond.any(axis=1)))
             joint = int(np.argmax(np.abs(values[row]) / most))
-            what = f"joint {joints[joint]} would {words} {values[row, joint]:.4g} {unit}"
+            what = f"{how}joint {joints[joint]} would {words} {values[row, joint]:.4g} {unit}"
             must = f"must be within ±{most[joint]:.4g} {unit}; {remedy}"
-            faults.append((row + first, code, f"{what}: {must}", float(most[joint])))
-        last, steps = len(q) - 1, np.abs(np.diff(q, axis=0)).max(axis=0)
-        found = self._moves.meeting(CheckedMotion(lambda share: q[round(share * last)], steps * last), now)
+            yield row + first, late, code, f"{what}: {must}", float(most[joint])
+        found = self._moves.meeting(CheckedMotion.through(q), now)
         if found is not None:
-            why = f"{found[1]}: choose points with another way between them"
-            faults.append((round(found[0] * last), "collision", why, CLEARANCE))
-        if not faults:
-            return
-        tick, code, why, limit = min(faults, key=lambda fault: fault[0])
-        time = max(tick - late, 0) * PERIOD
-        times = [point.time for point in command.points]
-        where = f"points[{min(int(np.searchsorted(times, time - SLACK)), len(times) - 1)}]"
-        raise RefusalError(code, where, f"{where}: {time:.3f} s after the start{how}, {why}", limit)
+            tick = round(found[0] * (len(q) - 1))
+            why = f"{how}{found[1]}: choose points with another way between them"
+            yield tick, late, "collision", why, CLEARANCE
 
 
 def _law(command: MoveTrajectory, now: PlanningState) -> PointLaw:
     """Return the interpolation from the present reference; refuse a first point that is not there."""
-    (first, *points), here = command.points, tuple(now.q.tolist())
-    if first.time > 0.0:
-        still = (0.0,) * len(here)
-        points = [TrajectoryPoint(time=0.0, q=here, qd=still, qdd=still), first, *points]
-    else:
-        for joint, (angle, start) in enumerate(zip(first.q, here, strict=True)):
-            if abs(angle - start) > NEAR:
-                must = f"within {NEAR:g} rad of {start:.4f}, where the arm is: begin there, or give it a later time"
-                raise invalid(f"points[0].q[{joint}]", f"{angle:.4f} rad", must, NEAR)
-        points = [replace(first, q=here), *points]
-    columns = ([getattr(point, name) for point in points] for name in ("time", "q", "qd", "qdd"))
-    arrays: list[Any] = [None if column[-1] is None else np.array(column) for column in columns]
+    columns = ([getattr(point, name) for point in command.points] for name in ("time", "q", "qd", "qdd"))
+    arrays: list[Any] = [None if column[0] is None else np.array(column) for column in columns]
+    times, q, *_ = arrays
+    if times[0] > 0.0:  # the start is no point: add it, at rest
+        arrays = [None if array is None else np.insert(array, 0, 0.0, axis=0) for array in arrays]
+    elif (far := np.abs(q[0] - now.q) > NEAR).any():
+        joint = int(np.argmax(far))
+        must = f"within {NEAR:g} rad of {now.q[joint]:.4f}, where the arm is: begin there, or give it a later time"
+        raise invalid(f"points[0].q[{joint}]", f"{q[0, joint]:.4f} rad", must, NEAR)
+    arrays[1][0] = now.q
     return PointLaw(*arrays)

@@ -3,7 +3,6 @@
 from tvist_controller.trajectory.base import (
     BrakingForecast,
     CheckedMotion,
-    JointCurve,
     JointLine,
     MotionLimits,
     Path,
@@ -13,7 +12,7 @@ from tvist_controller.trajectory.base import (
 )
 from tvist_controller.trajectory.compliant import Compliant, ForceTask
 from tvist_controller.trajectory.guided import Guided, ServoFollower, StuckError
-from tvist_controller.trajectory.motion import DoubleS, PlannedMotion, at_least, quickest_motion
+from tvist_controller.trajectory.motion import DoubleS, PlannedMotion, TimedMotion, at_least, quickest_motion
 from tvist_controller.trajectory.points import PointLaw
 from tvist_controller.trajectory.speed import VelocityFollower
 from tvist_controller.trajectory.stop import JointStop, PathStop, SlowedStop
@@ -29,7 +28,6 @@ __all__ = [
     "DoubleS",
     "ForceTask",
     "Guided",
-    "JointCurve",
     "JointLine",
     "JointStop",
     "MotionLimits",
@@ -43,6 +41,7 @@ __all__ = [
     "SetpointStream",
     "SlowedStop",
     "StuckError",
+    "TimedMotion",
     "Trajectory",
     "VelocityFollower",
     "at_least",

@@ -35,6 +35,12 @@ class CheckedMotion(NamedTuple):
     turned: Floats
     """Bound of each joint's turn, proportional for a part of the way, shape (n,) [rad]."""
 
+    @classmethod
+    def through(cls, samples: Floats) -> Self:
+        """Return the motion through at least two samples, one per tick, shape (k, n) [rad]."""
+        last, steps = len(samples) - 1, np.abs(np.diff(samples, axis=0)).max(axis=0)
+        return cls(lambda share: samples[round(share * last)], steps * last)
+
 
 class Path(ABC):
     """Joint positions q(x) as a function of a parameter x.
@@ -46,8 +52,6 @@ class Path(ABC):
 
     posture_of: Posture | None
     """Function from parameter to joint positions; None if they are the same."""
-    curved = False
-    """Whether the parameter does not go straight, so that only its time law knows the way."""
 
     def __init__(self, start: Floats, end: Floats) -> None:
         self.start, self.end = start, np.array(end, dtype=float)
@@ -116,12 +120,6 @@ class JointLine(Path):
         return CheckedMotion(lambda share: start + share * way, way)
 
 
-class JointCurve(JointLine):
-    """A way between two postures that the time law knows; filter and stops act on the joints, as on a line."""
-
-    curved = True
-
-
 @dataclass(frozen=True)
 class BrakingForecast:
     """When and how hard a trajectory will brake, in its path's parameter, as known without simulation."""
@@ -168,7 +166,7 @@ class Trajectory(ABC):
 
     @property
     def forecast(self) -> BrakingForecast | None:
-        """Forecast of the motion; None without a path."""
+        """Forecast of the motion; None without a path, or on a curve of each joint."""
         return None
 
     def fork(self) -> Self:

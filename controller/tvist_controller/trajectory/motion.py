@@ -212,9 +212,7 @@ class PlannedMotion(Trajectory):
 
     @property
     def forecast(self) -> BrakingForecast | None:
-        """Forecast of the motion, except on a curve; the time of braking is known only at constant rate."""
-        if self.path.curved:
-            return None
+        """Forecast of the motion; the time of braking is known only at constant rate."""
         time, rate = self.time, self._pace.rate
         known = rate > 0.0 and self.steady
         limits = self.limits if self.steady else self.agility
@@ -238,7 +236,7 @@ class PlannedMotion(Trajectory):
 
     def bearing(self, q: Floats) -> Floats:
         """Return a vector along the coming way from the parameter q, shape (m,)."""
-        return np.array(self.law.at(self.time)[1]) if self.path.curved else self.path.end - q
+        return self.path.end - q
 
     def hold(self, acceleration: float) -> bool:
         """Pause the motion if it then stands noticeably sooner; return whether it pauses.
@@ -256,10 +254,10 @@ class PlannedMotion(Trajectory):
 
     def _pays(self, paused: Self, acceleration: float) -> bool:
         """Return whether the motion stands noticeably sooner if it is paused."""
-        most, forecast = self.limits.acceleration, self.forecast  # the motion's own braking
-        if forecast is None:
+        if (forecast := self.forecast) is None:
             longest = self.limits.velocity / acceleration + LATEST
             return self.time + self.rate * longest < self.duration or _stands_sooner(paused, self.fork())
+        most = self.limits.acceleration  # of the motion's own braking
         longer = self.velocity * (1.0 / acceleration - 1.0 / most) + 2.0 * most / self.limits.jerk
         hardest = self.agility.acceleration <= most
         if forecast.steady == 0.0 and self.rate == 1.0 and self.steady and hardest:
@@ -291,6 +289,17 @@ class PlannedMotion(Trajectory):
     def finished(self) -> bool:
         """Whether the motion has reached its end."""
         return self.time >= self.duration
+
+
+class TimedMotion(PlannedMotion):
+    """A planned motion on a curve that only its law knows; filter and stops act on each joint, as on a line."""
+
+    law: PointLaw
+    forecast = None
+
+    def bearing(self, q: Floats) -> Floats:  # noqa: ARG002  the law knows the way
+        """Return the velocity of the law."""
+        return np.array(self.law.at(self.time)[1])
 
 
 def quickest_motion(

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from tvist_controller.trajectory.base import Floats, MotionLimits
-from tvist_controller.trajectory.spline import evaluate, hermite
+from tvist_controller.trajectory.spline import between, evaluate, hermite
 from tvist_plant.plant import PERIOD
 
 LEAST = (1e-3, 1e-2, 0.1)
@@ -14,10 +14,11 @@ STANDING = 2  # number of samples at rest before the start, and after the end
 
 
 class PointLaw:
-    """Joint positions as polynomials of time between points.
+    """Joint positions through points at given times.
 
-    Without velocities they are straight lines, with velocities cubics, with accelerations too quintics. All are
-    evaluated as quintics, of which lines and cubics are special cases.
+    At each tick they are on straight lines between points without velocities, on cubics between points with
+    velocities, on quintics with accelerations too. Between ticks, which play only while the time rate is not 1, they
+    are on a cubic through the positions at the ticks: only those are checked.
     """
 
     begins = 0.0
@@ -30,21 +31,19 @@ class PointLaw:
         qd: Floats | None = None,  # shape (k, n) [rad/s]
         qdd: Floats | None = None,  # only with velocities, shape (k, n) [rad/s^2]
     ) -> None:
-        self.moments, self.duration = times, float(times[-1])
         lasts = np.diff(times)[:, None]
         mean = np.diff(q, axis=0) / lasts
         start, end = (mean, mean) if qd is None else (qd[:-1], qd[1:])
-        # Those of a cubic, which are 0 on a straight line.
+        # The second derivatives of a cubic at its ends; they are 0 if it is a straight line.
         begun, ended = 6.0 * mean - 4.0 * start - 2.0 * end, 2.0 * start + 4.0 * end - 6.0 * mean
         bends = (begun / lasts, ended / lasts) if qdd is None else (qdd[:-1], qdd[1:])
-        coefficients = hermite(lasts, (q[:-1], start, bends[0]), (q[1:], end, bends[1]))
-        self._times = np.ascontiguousarray(times)
-        self._coefficients = np.ascontiguousarray(np.moveaxis(coefficients, 0, 1))
-        ticks: Floats = np.arange(1, math.ceil(self.duration / PERIOD - 1e-9), dtype=float)
-        self.samples: Floats = np.concatenate(
-            ([q[0]] * (STANDING + 1), self._evaluate(ticks * PERIOD)[0], [q[-1]] * (STANDING + 1))
-        )
+        coefficients = np.moveaxis(hermite(lasts, (q[:-1], start, bends[0]), (q[1:], end, bends[1])), 0, 1)
+        number = math.ceil(float(times[-1]) / PERIOD - 1e-9)
+        ticks, curve = np.arange(1.0, number), np.empty((4, number - 1, q.shape[1]))
+        evaluate(times, np.ascontiguousarray(coefficients), ticks * PERIOD, curve)
+        self.samples: Floats = np.concatenate(([q[0]] * (STANDING + 1), curve[0], [q[-1]] * (STANDING + 1)))
         """Positions at each tick, and some at rest before and after, shape (t, n) [rad]."""
+        self.moments, self.duration = times, number * PERIOD
         rates = (np.abs(np.diff(self.samples, order, axis=0)).max() / PERIOD**order for order in (1, 2, 3))
         self.limits = MotionLimits(
             *(max(float(rate), least) for rate, least in zip(rates, LEAST, strict=True))
@@ -52,14 +51,12 @@ class PointLaw:
 
     def at(self, time: float) -> tuple[list[float], list[float], list[float]]:
         """Return joint positions [rad], velocities and accelerations at a time [s], n each."""
-        q, qd, qdd, _ = self._evaluate(np.array([min(time, self.duration)]))
-        return q[0].tolist(), qd[0].tolist(), qdd[0].tolist()
+        ticks = min(time, self.duration) / PERIOD
+        first = int(ticks) + STANDING - 1
+        before, start, end, then = self.samples[first : first + 4]
+        q, qd, qdd = between(before, start, end, then, ticks - int(ticks))
+        return q.tolist(), (qd / PERIOD).tolist(), (qdd / PERIOD**2).tolist()
 
     def after(self, time: float) -> Floats:
         """Return the positions from a time on [s], one per tick, shape (k, n) [rad]."""
         return self.samples[STANDING + int(time / PERIOD) :]
-
-    def _evaluate(self, times: Floats) -> Floats:
-        out = np.empty((4, len(times), self._coefficients.shape[2]))
-        evaluate(self._times, self._coefficients, times, out)
-        return out

@@ -49,6 +49,16 @@ def hermite(
     return np.stack((p0, v0, 0.5 * a0, c3 / h**3, c4 / h**4, c5 / h**5))
 
 
+def between(
+    before: Floats, start: Floats, end: Floats, then: Floats, t: float | Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Return a cubic and its first two derivatives at t, 0 to 1, between the middle two of four even samples."""
+    change, own, next_ = end - start, 0.5 * (end - before), 0.5 * (then - start)
+    bend, twist = 3.0 * change - 2.0 * own - next_, own + next_ - 2.0 * change
+    q = start + t * (own + t * (bend + t * twist))
+    return q, own + t * (2.0 * bend + 3.0 * t * twist), 2.0 * bend + 6.0 * t * twist
+
+
 @compiled
 def evaluate(
     knots: Floats, coefficients: Floats, s: Floats, out: Floats

@@ -7,6 +7,7 @@ import numpy as np
 import ruckig
 
 from tvist_controller.trajectory.base import BrakingForecast, Floats, Path, Trajectory
+from tvist_controller.trajectory.spline import between
 from tvist_plant.plant import PERIOD
 
 
@@ -204,8 +205,8 @@ class SlowedStop(Trajectory):
 
     @property
     def forecast(self) -> BrakingForecast | None:
-        """BrakingForecast of its motion, which brakes from the start; None on a curve."""
-        if self.path.curved:
+        """BrakingForecast of its motion, which brakes from the start; None on a curve of each joint."""
+        if self.path.posture_of is None:
             return None
         along = self._samples[:, self.path.leading]
         braking, jerk = (
@@ -228,10 +229,7 @@ def _between(ahead: Floats, ticks: Floats) -> Floats:
     number = np.minimum(ticks.astype(int), last - 1) + 1
     t = (ticks - (number - 1))[:, None]
     before, start, end, then = (ahead[np.minimum(number + step, last)] for step in (-1, 0, 1, 2))
-    own, next_ = 0.5 * (end - before), 0.5 * (then - start)
-    change = end - start
-    bent = 3.0 * change - 2.0 * own - next_ + t * (own + next_ - 2.0 * change)
-    return np.asarray(start + t * (own + t * bent))
+    return between(before, start, end, then, t)[0]
 
 
 def _slowing(start: Sequence[Sequence[float]], acceleration: float, jerk: float) -> ruckig.Trajectory:
