@@ -139,8 +139,8 @@ class Sequence:
     def _foresee(self):
         """Return the future references if no command comes, provided that the motion follows a line of the joints."""
         motion, cycle = self.robot.controller.motion, self.robot.controller.cycle
-        path = cycle.trajectory.path
-        if cycle.mode.at_rest or path is None or path.curved or path.posture_of is not None:
+        path, forecast = cycle.trajectory.path, cycle.trajectory.forecast
+        if cycle.mode.at_rest or path is None or path.posture_of is not None or forecast is None:
             return None
         ahead = motion.stopper.simulate_until_rest()
         return None if ahead is None else Undisturbed(ahead[1:], self.robot.controller.tick_number)
