@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from tests.lab.made_logs import damped
 
+from tvist_controller.api.line import InverseDynamics, JointLine, body, quickest_motion
 from tvist_controller.sources import calibrations
 from tvist_lab.metrics import motions
 from tvist_lab.recordings import STATE_COLUMNS, Recording
@@ -18,6 +19,18 @@ JOINTS = 6
 def straight_step(ticks, start, stop, stroke):
     """A joint that goes at constant speed: its first and last moving ticks are exact."""
     return stroke * np.clip((np.arange(ticks) - start) / (stop - start), 0.0, 1.0)
+
+
+def torques_along(arm, payload, start, end, limits):
+    """Return the torques of weight and of motion at each tick of the quickest motion of a rigid arm [N m]."""
+    dynamics, motion = InverseDynamics(arm, body(payload)), quickest_motion(JointLine(start, end), limits)
+    way = [start]
+    while not motion.finished:
+        way.append(motion.next())
+    q = np.array(way)
+    qd = np.gradient(q, PERIOD, axis=0)
+    weight = dynamics.gravities(q)
+    return weight, dynamics.torques(q, qd, np.gradient(qd, PERIOD, axis=0)) - weight
 
 
 @pytest.fixture(scope="session")

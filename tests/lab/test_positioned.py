@@ -4,15 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.lab.conftest import torques_along
 
 from tvist_controller.api.line import (
     TORQUE_SHARE,
     CollisionModel,
-    InverseDynamics,
-    JointLine,
     body,
     paper_payload,
-    quickest_motion,
 )
 from tvist_lab.identification.design import free_configurations, jog_of, predicted
 from tvist_lab.identification.jogs import plan_jogs
@@ -50,16 +48,9 @@ async def test_every_path_is_free_and_keeps_base_and_outer_wrist():
 async def test_jogs_stay_within_the_torques():
     """Its torque swings by as much again as that of a rigid arm, about its weight's."""
     plan = await planned(8)
-    dynamics = InverseDynamics(ROBOT, body(plan.arm.payloads[0]))
     for jog in plan.jogs:
-        motion, way = quickest_motion(JointLine(jog.way[-1], jog.q), jog.limits), [jog.way[-1]]
-        while not motion.finished:
-            way.append(motion.next())
-        q = np.array(way)
-        qd = np.gradient(q, PERIOD, axis=0)
-        weight = dynamics.gravities(q)
-        pushed = dynamics.torques(q, qd, np.gradient(qd, PERIOD, axis=0)) - weight
-        assert (np.abs(weight) + 2.0 * np.abs(pushed) <= TORQUE_SHARE * np.array(ROBOT.limits.torque)).all()
+        weight, moving = torques_along(ROBOT, plan.arm.payloads[0], jog.way[-1], jog.q, jog.limits)
+        assert (np.abs(weight) + 2.0 * np.abs(moving) <= TORQUE_SHARE * np.array(ROBOT.limits.torque)).all()
     assert len({jog.limits.acceleration for jog in plan.jogs}) > 1, "some poses demand a gentler jog"
 
 

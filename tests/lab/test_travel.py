@@ -7,14 +7,11 @@ from unittest.mock import AsyncMock
 import numpy as np
 import pytest
 from msgspec import structs
+from tests.lab.conftest import torques_along
 
 from tvist_controller.api.line import (
-    InverseDynamics,
-    JointLine,
     MotionLimits,
-    body,
     paper_payload,
-    quickest_motion,
 )
 from tvist_lab.collect import collect
 from tvist_lab.identification.design import free_configurations
@@ -42,14 +39,7 @@ def stretched_and_upright(arm):
 
 def assert_torques_kept(arm, payload, start, end, limits):
     """Check weight, friction and twice the motion's torque: an undamped arm swings by as much again."""
-    dynamics, motion = InverseDynamics(arm, body(payload)), quickest_motion(JointLine(start, end), limits)
-    way = [start]
-    while not motion.finished:
-        way.append(motion.next())
-    q = np.array(way)
-    qd = np.gradient(q, PERIOD, axis=0)
-    weight = dynamics.gravities(q)
-    moving = dynamics.torques(q, qd, np.gradient(qd, PERIOD, axis=0)) - weight
+    weight, moving = torques_along(arm, payload, start, end, limits)
     needed = np.abs(weight) + 2.0 * np.abs(moving) + np.array(arm.drives.coulomb_friction)
     assert (needed.max(axis=0) <= np.array(arm.limits.torque)).all()
 
