@@ -6,7 +6,7 @@ from typing import Any
 
 from msgspec import Struct
 
-from tvist_ros2.messages import fields_of, ros
+from tvist_ros2.messages import fields_of, parts_of, ros
 
 HEADER = b"\x00\x01\x00\x00"
 """Identifies plain CDR, little-endian; the last two bytes are options. Values are aligned relative to its end."""
@@ -38,20 +38,13 @@ def decode(kind: type[Struct], data: bytes) -> Any:
 
 
 @cache
-def _parts(kind: str) -> tuple[str, bool, int | None]:
-    """Return the type of one entry, whether there are several, and their number; None: it precedes them."""
-    inner, bracket, size = kind.rstrip("]").partition("[")
-    return inner, bool(bracket), int(size) if size else None
-
-
-@cache
 def _form(kind: str, count: int) -> struct.Struct:
     return struct.Struct(f"<{count}{_CODES[kind]}")
 
 
 def _write(out: bytearray, kind: str, value: Any) -> None:
     """Append a value of a type in ROS 2's notation."""
-    inner, several, size = _parts(kind)
+    inner, several, size = parts_of(kind)
     if several and size is None:
         _write(out, "uint32", len(value))
     values = value if several else (value,)
@@ -74,7 +67,7 @@ def _write(out: bytearray, kind: str, value: Any) -> None:
 
 def _read(data: bytes, at: int, kind: str) -> tuple[Any, int]:
     """Return the value of a type at a place, and the place after it."""
-    inner, several, size = _parts(kind)
+    inner, several, size = parts_of(kind)
     count = 1 if size is None else size
     if several and size is None:
         count, at = _read(data, at, "uint32")

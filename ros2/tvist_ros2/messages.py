@@ -1,6 +1,7 @@
 """The messages of ROS 2 that the gateway uses, read from messages.txt, and their types, from hashes.txt."""
 
 from collections.abc import Iterator
+from functools import cache
 from importlib.resources import files
 from types import SimpleNamespace
 from typing import Any, NamedTuple
@@ -26,6 +27,13 @@ def fields_of(message: str) -> tuple[tuple[str, str], ...]:
     return _FIELDS[message]
 
 
+@cache
+def parts_of(kind: str) -> tuple[str, bool, int | None]:
+    """Return the type of an entry, whether there are several, and their number; None if the data tells it."""
+    inner, bracket, size = kind.rstrip("]").partition("[")
+    return inner, bool(bracket), int(size) if size else None
+
+
 def seconds(duration: Any) -> float:
     """Return a Duration or a Time as a number [s]."""
     return float(duration.sec + 1e-9 * duration.nanosec)
@@ -46,10 +54,10 @@ def _fields() -> Iterator[tuple[str, tuple[tuple[str, str], ...]]]:
 
 def _default(kind: str, known: dict[str, Any]) -> Any:
     """Return the value that a field of this type has if it is not given, as in ROS 2."""
-    inner, bracket, size = kind.rstrip("]").partition("[")
-    if size:
-        return bytes(int(size)) if inner == "uint8" else (0.0,) * int(size)
-    if bracket:
+    inner, several, size = parts_of(kind)
+    if size is not None:
+        return bytes(size) if inner == "uint8" else (0.0,) * size
+    if several:
         return []
     if inner in known:
         return known[inner]()

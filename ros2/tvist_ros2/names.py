@@ -15,7 +15,7 @@ class Qos(NamedTuple):
     depth: int = 10
     reliable: bool = True
     latched: bool = False
-    """Whether the last messages are kept for later subscribers, which ROS 2 calls transient local."""
+    """True if later subscribers get the last messages; ROS 2 calls this transient local."""
 
     def __str__(self) -> str:
         """Return rmw_zenoh's text, which leaves out defaults."""

@@ -94,6 +94,5 @@ def _stamp(nanoseconds: int) -> Any:
 def _quaternion(rotation: list[float]) -> Any:
     """Return a rotation vector [rad] as a quaternion."""
     angle = math.hypot(*rotation)
-    # sin(angle / 2) / angle, which tends to 1/2
-    factor = 0.5 * math.sin(0.5 * angle) / (0.5 * angle) if angle > 0.0 else 0.5
+    factor = math.sin(0.5 * angle) / angle if angle > 0.0 else 0.5
     return ros.Quaternion(*(factor * part for part in rotation), math.cos(0.5 * angle))

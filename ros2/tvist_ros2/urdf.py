@@ -1,5 +1,6 @@
 """Describes a robot to ROS 2: the names of its joints, and a URDF made from its geometry."""
 
+from collections.abc import Iterable
 from math import acos, atan2, dist
 from xml.etree.ElementTree import Element, SubElement, tostring
 
@@ -56,7 +57,7 @@ def _joint(robot: Element, name: str, kind: str, parent: str, child: str) -> Ele
     return joint
 
 
-def _origin(of: Element, place: Origin) -> None:
+def _origin(of: Element, place: Iterable[float]) -> None:
     numbers = [repr(float(number)) for number in place]
     SubElement(of, "origin", xyz=" ".join(numbers[:3]), rpy=" ".join(numbers[3:]))
 
@@ -66,10 +67,8 @@ def _draw(link: Element, capsule: Capsule) -> None:
     length = dist(capsule.start, capsule.end)
     if length > 0.0:
         x, y, z = (end - start for start, end in zip(capsule.start, capsule.end, strict=True))
-        middle_x, middle_y, middle_z = (
-            0.5 * sum(ends) for ends in zip(capsule.start, capsule.end, strict=True)
-        )
+        middle = [0.5 * sum(ends) for ends in zip(capsule.start, capsule.end, strict=True)]
         visual = SubElement(link, "visual")
-        _origin(visual, (middle_x, middle_y, middle_z, 0.0, acos(z / length), atan2(y, x)))
+        _origin(visual, (*middle, 0.0, acos(z / length), atan2(y, x)))
         size = {"radius": repr(capsule.radius), "length": repr(length + 2.0 * capsule.radius)}
         SubElement(SubElement(visual, "geometry"), "cylinder", size)
