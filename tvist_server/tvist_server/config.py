@@ -130,7 +130,7 @@ class ServeConfig(ServeOptions, frozen=True, kw_only=True, forbid_unknown_fields
     def reached(self) -> str:
         """Endpoint at which clients on this machine reach the robots."""
         first = (*self.endpoints, *self.connect)[0]
-        return first.replace("0.0.0.0", "127.0.0.1").replace("[::]", "[::1]")  # noqa: S104  only said
+        return first.replace("0.0.0.0", "127.0.0.1").replace("[::]", "[::1]")  # noqa: S104  listens nowhere: clients cannot connect to it
 
     def command_line(self, command: str, name: str) -> str:
         """Return the command line that runs `command` for a robot from this machine."""

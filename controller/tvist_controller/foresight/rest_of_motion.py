@@ -186,9 +186,10 @@ class RemainingMotion:
             going_on = trajectory.fork()
             going_on.release(1.0)  # a pause may end
             left = trajectory.law.after(max(trajectory.time - cycle.tvist.delay, 0.0))
-            return self._on(left) or self._on(
-                self._stopper.simulate_until_rest(tvist, going_on) if len(left) < FORESEEN else None
-            )
+            met = self._on(left)
+            if met is None and len(left) < FORESEEN:
+                met = self._on(self._stopper.simulate_until_rest(tvist, going_on))
+            return met
         if trajectory.foreseeable and (ahead := self._stopper.simulate_until_rest(tvist)) is not None:
             return self._on(ahead)
         guard = self._guide_guard if cycle.guard is self._guide_guard else self._guard

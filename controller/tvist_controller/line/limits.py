@@ -168,7 +168,8 @@ class StopTorque:
 
     def _torques(self, stop: AnyStop, times: Floats) -> tuple[Floats, Floats, Floats]:
         """Return positions, torques and largest absolute torques of any body at k times, each (k, n)."""
-        dynamics, (q, qd, qdd) = self._dynamics, stop.states(times)
+        dynamics = self._dynamics
+        q, qd, qdd = stop.states(times)
         torque = dynamics.torques(q, qd, qdd)
         if not dynamics.changing:
             return q, torque, np.abs(torque)

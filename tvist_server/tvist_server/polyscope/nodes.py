@@ -93,7 +93,7 @@ class Nodes:
         shown = [one for one in children_of(node) if one.tag != "SuppressedNode"]
         end = node if node.tag == "Folder" else None  # what follows a folder follows its last node
         self._following.update(pairwise([*shown, end]))
-        suppressed_too = pairwise([*children_of(node), end])
+        suppressed_too = pairwise([*children_of(node), end])  # next to a Move, suppressed nodes count
         self._following.update(
             (one, after) for one, after in suppressed_too if one is not None and one.tag == "Move"
         )
