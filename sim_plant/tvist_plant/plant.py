@@ -193,12 +193,12 @@ class Plant(ABC):
 
     @property
     def watched(self) -> bool:
-        """Whether the arm's own controller moves the arm and tvist only watches; see `RealArm.cycle_report`."""
+        """True if the arm's own controller moves the arm and tvist only watches; see `RealArm.cycle_report`."""
         return False
 
     @property
     def supervised(self) -> bool:
-        """Whether tvist moves the arm through the arm's own controller; see `RealArm.latest_report`."""
+        """True if tvist moves the arm through the arm's own controller; see `RealArm.latest_report`."""
         return False
 
     def truth(self) -> PlantTruth | None:

@@ -22,8 +22,9 @@ class Findings(NamedTuple):
 def check(text: str, signatures: Signatures) -> Findings:
     """Return the errors and warnings of a script.
 
-    If the syntax is wrong, the only error is at the first token that does not fit. Else the errors are mainly
-    unknown names. Warnings are calls that fail when the program reaches them, since the function is not
+    If the syntax is wrong, the only error is at the first token that does not fit. Else the errors are
+    unknown names, and arguments that name no parameter, name one twice, or follow a named one without a name.
+    Warnings are calls that fail when the program reaches them, since the function is not
     simulated or the arguments do not fit; and, if there are no errors, constructs that a UR robot rejects or
     reads differently, and a text that only defines functions.
     """

@@ -26,8 +26,8 @@ EQUALITY = {"==": "is_equal", "!=": "is_unequal"}
 Report = Callable[[tree.Node, str], None]
 
 
-class Misfit(Exception):  # noqa: N818  no error of the text: the program fails when it reaches the call
-    """A call cannot work, for a reason that may be at one of its arguments."""
+class MisfitError(Exception):
+    """A call cannot work, for a reason that may be at one of its arguments; the program fails when it reaches it."""
 
     def __init__(self, at: tree.Node, why: str) -> None:
         super().__init__(why)
@@ -177,7 +177,7 @@ class Expressions:
         """Translate a call; one that cannot work fails when the program reaches it."""
         try:
             return self.working_call(node, built_in=built_in)
-        except Misfit as misfit:
+        except MisfitError as misfit:
             return self.failing(misfit.at, misfit.why)
 
     def failing(self, at: tree.Node, why: str) -> ast.expr:
@@ -205,7 +205,7 @@ class Expressions:
             for argument in node.arguments:
                 self.value(argument.value)
             if signature is not None:
-                raise Misfit(node, f"{node.name}: {signature.fails}")
+                raise MisfitError(node, f"{node.name}: {signature.fails}")
             self.report(node, name_not_found(node.name))
             return ast.Constant(None)
         self.used.add(node.name)
@@ -226,7 +226,7 @@ class Expressions:
         A parameter is a tuple of its name and the name of its default, or None if it has none.
 
         Raises:
-            Misfit: There are too many arguments, or a parameter without default gets none.
+            MisfitError: There are too many arguments, or a parameter without default gets none.
         """
         given: dict[str, ast.expr] = {}
         names = [name for name, _ in parameters]
@@ -237,7 +237,9 @@ class Expressions:
                 if place >= len(names):
                     counted = "1 argument" if len(names) == 1 else f"{len(names)} arguments"
                     limit = f"at most {counted}" if names else "no arguments"
-                    raise Misfit(argument, f"{node.name} takes {limit}, but {len(node.arguments)} are given")
+                    raise MisfitError(
+                        argument, f"{node.name} takes {limit}, but {len(node.arguments)} are given"
+                    )
                 if place and node.arguments[place - 1].name is not None:
                     self.report(argument, "an argument without a name follows one with a name")
                 parameter = names[place]
@@ -250,7 +252,7 @@ class Expressions:
         for parameter, default in parameters:
             if parameter not in given:
                 if default is None:
-                    raise Misfit(node, f"{node.name} needs a value for its parameter {parameter}")
+                    raise MisfitError(node, f"{node.name} needs a value for its parameter {parameter}")
                 given[parameter] = name(default)
         return _arranged(given, names)
 
