@@ -14,6 +14,7 @@ from tvist_ros2.mover import Mover
 from tvist_ros2.names import Qos
 from tvist_ros2.node import Node
 from tvist_ros2.outputs import RATE, Outputs
+from tvist_ros2.tasks import Tasks
 
 CONTROLLER = "scaled_joint_trajectory_controller"  # as in UR's driver
 POSITIONS = "forward_position_controller/commands"
@@ -51,7 +52,7 @@ class Gateway:
         self._outputs = Outputs(node, info, rate)
         self._log = node.publisher("/rosout", TYPES["rcl_interfaces/msg/Log"], Qos(1000, latched=True))
         self._warned = "", 0.0
-        self._moving: asyncio.Task[None] | None = None  # a trajectory of the topic that is being started
+        self._tasks = Tasks()
         self._mover = Mover(robot, self._warn)
         self._action = TrajectoryAction(
             node, f"{CONTROLLER}/follow_joint_trajectory", self._mover, self._outputs, self._warn
@@ -76,6 +77,7 @@ class Gateway:
                 self._action.take(state)
         finally:
             repeating.cancel()
+            await self._tasks.cancel()
             await self._mover.close()
 
     async def _repeat(self) -> None:
@@ -94,13 +96,10 @@ class Gateway:
             self._warn(f"a position command has {given} numbers: must have {joints}")
 
     def _trajectory(self, message: Any) -> None:
-        self._moving = asyncio.create_task(self._move(message))
+        self._tasks.start(self._move(message))
 
     async def _move(self, message: Any) -> None:
-        try:
-            await self._mover.begin(self._outputs.points_of(message))
-        except TvistError as error:
-            self._warn(f"a trajectory was refused: {error}")
+        await self._action.start(ros.FollowJointTrajectory_Goal(message))
 
     async def _command(self, command: Callable[[Arm], Awaitable[None]], _: Any) -> Any:
         async def controlled() -> None:

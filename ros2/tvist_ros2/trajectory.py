@@ -6,17 +6,9 @@ from typing import Any
 from tvist_protocol import State, TrajectoryPoint, TvistError
 from tvist_ros2.messages import seconds
 
-SUCCESSFUL, INVALID_GOAL, INVALID_JOINTS = 0, -1, -2
-PATH_TOLERANCE_VIOLATED, GOAL_TOLERANCE_VIOLATED = -4, -5
-"""Values of `error_code` in the result of FollowJointTrajectory."""
-
 
 class GoalError(TvistError):
-    """A trajectory that cannot be carried out, with the `error_code` of its result."""
-
-    def __init__(self, code: int, why: str) -> None:
-        super().__init__(why)
-        self.error_code = code
+    """A trajectory that cannot be carried out."""
 
 
 def points_of(
@@ -24,17 +16,23 @@ def points_of(
 ) -> list[TrajectoryPoint]:
     """Return the points of a JointTrajectory for `move_trajectory`, with the joints in the robot's order.
 
-    If no point has velocities, all get those of a smooth curve from the posture `q`. GoalError if the joints are not
-    the robot's, numbers are missing, or the start is after `now`; the robot checks times and limits.
+    A stamp of the header says when the trajectory starts; points whose time has passed at `now` are left out. If no
+    point has velocities, all get those of a smooth curve from the posture `q`. GoalError if the joints are not the
+    robot's, numbers are missing or all points have passed; the robot checks times and limits.
     """
     order = _order(trajectory.joint_names, joints)
     if not trajectory.points:
-        raise GoalError(INVALID_GOAL, "the trajectory has no points")
-    ahead = seconds(trajectory.header.stamp) - now
-    if ahead > 0.0:
-        why = f"the trajectory starts {ahead:.3f} s in the future: give the stamp 0 to start at once"
-        raise GoalError(INVALID_GOAL, why)
+        raise GoalError("the trajectory has no points")
     points = [_point(number, point, order) for number, point in enumerate(trajectory.points)]
+    start = seconds(trajectory.header.stamp)
+    if start:
+        passed = now - start
+        points = [{**point, "time": point["time"] - passed} for point in points if point["time"] > passed]
+        if not points:
+            why = (
+                f"the trajectory started {passed:.3f} s ago, and has ended: give the stamp 0 to start at once"
+            )
+            raise GoalError(why)
     if not any("qd" in point for point in points):
         _smooth(points, q)
     return [TrajectoryPoint(**point) for point in points]
@@ -49,7 +47,7 @@ def _point(number: int, point: Any, order: Sequence[int]) -> dict[str, Any]:
             read[name] = [values[place] for place in order]
         elif values or name == "q":
             why = f"points[{number}].{field} has {len(values)} numbers: must have {len(order)}"
-            raise GoalError(INVALID_GOAL, why)
+            raise GoalError(why)
     return read
 
 
@@ -57,7 +55,7 @@ def _order(given: Sequence[str], joints: Sequence[str]) -> list[int]:
     """Return the place of each of the robot's joints among those given."""
     if sorted(given) != sorted(joints):
         why = f"the joints are {', '.join(given) or 'none'}: must be {', '.join(joints)}, in any order"
-        raise GoalError(INVALID_JOINTS, why)
+        raise GoalError(why)
     return [given.index(joint) for joint in joints]
 
 
@@ -72,18 +70,18 @@ def _smooth(points: list[dict[str, Any]], q: Sequence[float]) -> None:
 
 
 class Tolerances:
-    """Largest deviations of joints: JointTolerance messages, whose zeros check nothing; GoalError if one is unknown."""
+    """Largest deviations of joints: JointTolerance messages, of which only positive numbers are limits."""
 
     def __init__(self, given: Sequence[Any], joints: Sequence[str]) -> None:
+        """Raise GoalError if a joint is not among the robot's."""
         for tolerance in given:
             if tolerance.name not in joints:
-                raise GoalError(INVALID_JOINTS, f"a tolerance is for {tolerance.name!r}, which is no joint")
-        self._given, self._joints = given, list(joints)
+                raise GoalError(f"a tolerance is for {tolerance.name!r}, which is no joint")
+        self._given = [(joints.index(tolerance.name), tolerance) for tolerance in given]
 
     def violation(self, state: State) -> str | None:
         """Return which joint deviates too far from its shaped reference and how far; None if none does."""
-        for tolerance in self._given:
-            joint = self._joints.index(tolerance.name)
+        for joint, tolerance in self._given:
             for name, allowed, target, actual in (
                 ("position", tolerance.position, state.target_q, state.actual_q),
                 ("velocity", tolerance.velocity, state.target_qd, state.actual_qd),

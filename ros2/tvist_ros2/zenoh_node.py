@@ -20,6 +20,7 @@ from tvist_ros2.cdr import CdrError, decode, encode
 from tvist_ros2.messages import RosType
 from tvist_ros2.names import DEFAULT, Kind, Qos, Tokens, absolute, key
 from tvist_ros2.node import Answer, Node
+from tvist_ros2.tasks import Tasks
 
 log = logging.getLogger(__name__)
 
@@ -37,7 +38,7 @@ class ZenohNode(Node):
         self._tokens = Tokens(domain, str(session.info.zid()), namespace, name)
         self._congestion = zenoh.CongestionControl.BLOCK if lossless else zenoh.CongestionControl.DROP
         self._loop = asyncio.get_running_loop()
-        self._answering: set[asyncio.Task[None]] = set()
+        self._answering = Tasks()
         # Zenoh withdraws what is no longer referenced.
         self._kept: list[object] = [session.liveliness().declare_token(self._tokens.node())]
 
@@ -105,13 +106,8 @@ class ZenohNode(Node):
                 response = encode(await answer(request))
                 query.reply(where, response, attachment=_attachment(number, identifier))
 
-        def begin(query: zenoh.Query) -> None:
-            task = self._loop.create_task(respond(query))
-            self._answering.add(task)
-            task.add_done_callback(self._answering.discard)
-
         def on_query(query: zenoh.Query) -> None:
-            wake(self._loop, partial(begin, query))
+            wake(self._loop, lambda: self._answering.start(respond(query)))
 
         self._kept.append(
             self._session.declare_queryable(where, Callback(on_query, indirect=False), complete=True)
@@ -119,9 +115,7 @@ class ZenohNode(Node):
         self._announce("SS", name, of)
 
     async def close(self) -> None:
-        for task in tuple(self._answering):
-            task.cancel()
-        await asyncio.gather(*self._answering, return_exceptions=True)
+        await self._answering.cancel()
         await asyncio.to_thread(close_session, self._session)
 
     def _key(self, name: str, of: RosType) -> str:

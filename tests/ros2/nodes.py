@@ -60,8 +60,9 @@ class MemoryNode(Node):
 class SteppedRobot:
     """A robot behind a gateway; `step` lets time pass and everybody react."""
 
-    def __init__(self, host, stepper, node):
-        self.host, self.node, self._stepper, self._goals = host, node, stepper, 0
+    def __init__(self, host, other, stepper, node):
+        self.host, self.other, self.node = host, other, node
+        self._stepper, self._goals = stepper, 0
 
     async def settle(self):
         """Let everybody react without time passing."""
@@ -101,14 +102,24 @@ class SteppedRobot:
         request = ros.FollowJointTrajectory_GetResult_Request(uuid)
         return self.node.ask(f"{ACTION}/get_result", request)
 
+    async def cancel(self, uuid):
+        """Cancel a goal."""
+        request = ros.CancelGoal_Request(ros.GoalInfo(uuid))
+        return await self.until(self.node.ask(f"{ACTION}/cancel_goal", request))
+
+    def move(self, points, **more):
+        """Send points to the topic for trajectories."""
+        self.node.send(f"{CONTROLLER}/joint_trajectory", trajectory_of(points, **more))
+
     async def trigger(self, name):
         """Call a service of the dashboard."""
         return await self.until(self.node.ask(f"dashboard_client/{name}", ros.Trigger_Request()))
 
 
-def trajectory_of(points, names=JOINTS):
+def trajectory_of(points, names=JOINTS, stamp=0.0):
     """Return a JointTrajectory with points (time, q, qd)."""
     return ros.JointTrajectory(
+        ros.Header(ros.Time(*divmod(round(stamp * 1e9), 10**9))),
         joint_names=list(names),
         points=[
             ros.JointTrajectoryPoint(list(q), list(qd), time_from_start=duration(time))
@@ -130,7 +141,7 @@ async def stepped_robot(node=None, rate=500.0, **setup):
     gateway = Gateway(robot, await robot.info(), node, rate=rate)
     running = asyncio.create_task(gateway.run())
     async with other.clock_control("clock") as stepper:
-        stepped = SteppedRobot(host, stepper, node)
+        stepped = SteppedRobot(host, other, stepper, node)
         await stepped.settle()
         yield stepped
     running.cancel()

@@ -5,17 +5,21 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from tests.ros2.nodes import ACTION, JOINTS, duration, stepped_robot, trajectory_of
+from tests.ros2.nodes import ACTION, JOINTS, duration, stepped_robot
 
-from tvist_ros2.action import ABORTED, CANCELED, SUCCEEDED, TERMINATED, UNKNOWN_GOAL
-from tvist_ros2.gateway import CONTROLLER, POSITIONS
-from tvist_ros2.messages import ros, seconds
-from tvist_ros2.trajectory import (
+from tvist_ros2.action import (
+    ABORTED,
+    CANCELED,
     GOAL_TOLERANCE_VIOLATED,
     INVALID_GOAL,
-    INVALID_JOINTS,
     PATH_TOLERANCE_VIOLATED,
+    SUCCEEDED,
+    TERMINATED,
+    UNKNOWN,
+    UNKNOWN_GOAL,
 )
+from tvist_ros2.gateway import POSITIONS
+from tvist_ros2.messages import ros, seconds
 
 STILL = [0.0] * 6
 QUIET = {"calibration": "none", "shaper": "none"}
@@ -135,47 +139,119 @@ async def test_cancelled_goal_stops_on_its_path_and_the_next_is_accepted():
         start = robot.q
         uuid, _ = await robot.send_goal(there_and_back(start))
         await robot.step(200)
-        cancel = ros.CancelGoal_Request(ros.GoalInfo(uuid))
-        assert (await robot.until(robot.node.ask(f"{ACTION}/cancel_goal", cancel))).goals_canceling[
-            0
-        ].goal_id == uuid
+        assert (await robot.cancel(uuid)).goals_canceling[0].goal_id == uuid
         ended = await robot.until(robot.result(uuid))
         assert ended.status == CANCELED
         assert start[0] < robot.q[0] < start[0] + 0.2
         assert robot.q[1:] == pytest.approx(start[1:], abs=1e-9)
         _, accepted = await robot.send_goal([(1.0, start, STILL)])
         assert accepted
-        again = await robot.until(robot.node.ask(f"{ACTION}/cancel_goal", cancel))
-        assert again.return_code == TERMINATED
-        unknown = ros.CancelGoal_Request(ros.GoalInfo(ros.UUID(b"x" * 16)))
-        answer = await robot.until(robot.node.ask(f"{ACTION}/cancel_goal", unknown))
-        assert answer.return_code == UNKNOWN_GOAL
+        assert (await robot.cancel(uuid)).return_code == TERMINATED
+        assert (await robot.cancel(ros.UUID(b"x" * 16))).return_code == UNKNOWN_GOAL
+        assert len((await robot.cancel(ros.UUID())).goals_canceling) == 1
 
 
-async def test_rejected_goal_changes_nothing_and_its_reason_can_be_read():
+async def test_rejected_goal_changes_nothing_and_its_reason_is_logged():
     async with stepped_robot(**QUIET) as robot:
         await robot.step(10)
         q = robot.q
         cases = [
-            ([(1.0, q, STILL)], [*JOINTS[:5], "elbow"], INVALID_JOINTS, "must be shoulder_pan_joint"),
-            ([(1.0, q[:5], STILL)], JOINTS, INVALID_GOAL, r"points[0].positions has 5 numbers: must have 6"),
-            ([], JOINTS, INVALID_GOAL, "has no points"),
-            (there_and_back(q, time=0.1, by=2.0), JOINTS, INVALID_GOAL, "points[0]"),
-            ([(1.0, q, STILL), (0.5, q, STILL)], JOINTS, INVALID_GOAL, "points[1]"),
+            ([(1.0, q, STILL)], [*JOINTS[:5], "elbow"], "must be shoulder_pan_joint"),
+            ([(1.0, q[:5], STILL)], JOINTS, r"points[0].positions has 5 numbers: must have 6"),
+            ([], JOINTS, "has no points"),
+            (there_and_back(q, time=0.1, by=2.0), JOINTS, "points[0]"),
+            ([(1.0, q, STILL), (0.5, q, STILL)], JOINTS, "points[1]"),
         ]
-        for points, names, code, why in cases:
+        for points, names, why in cases:
             uuid, accepted = await robot.send_goal(points, names)
             assert not accepted
-            result = (await robot.until(robot.result(uuid))).result
-            assert result.error_code == code
-            assert why in result.error_string
-            assert result.error_string in robot.node.published["/rosout"][-1].msg
+            assert (await robot.until(robot.result(uuid))).status == UNKNOWN
+            assert why in robot.node.published["/rosout"][-1].msg
         assert robot.q == q
         assert robot.host.controller.session.lease is None
-        _, accepted = await robot.send_goal(there_and_back(q))
+        moving, accepted = await robot.send_goal(there_and_back(q))
         assert accepted
-        uuid, accepted = await robot.send_goal(there_and_back(q))
-        assert not accepted
+        for _ in range(40):
+            assert not (await robot.send_goal([]))[1]
+        assert (await robot.until(robot.result(moving))).status == SUCCEEDED
+
+
+async def test_newest_trajectory_replaces_the_one_before():
+    async with stepped_robot(**QUIET) as robot:
+        await robot.step(10)
+        start = robot.q
+        first, _ = await robot.send_goal(there_and_back(start))
+        await robot.step(100)
+        second, accepted = await robot.send_goal(there_and_back(start, time=1.5))
+        assert accepted
+        replaced = await robot.until(robot.result(first))
+        assert (replaced.status, replaced.result.error_code) == (ABORTED, INVALID_GOAL)
+        assert "newer" in replaced.result.error_string
+        for place in range(1, 6):  # as a slider in a program sends them
+            robot.move([(0.5, [start[0] + 0.02 * place, *start[1:]], [])])
+            await robot.step(40)
+        assert (await robot.until(robot.result(second))).status == ABORTED
+        await robot.step(500)
+        assert robot.q == pytest.approx([start[0] + 0.1, *start[1:]], abs=1e-6)
+        assert robot.host.controller.session.lease is None
+
+
+async def test_goal_waits_for_its_tolerance_until_it_is_cancelled_or_replaced():
+    """Without a tolerance of time there is no end, as with ROS 2's controller."""
+    tight = {"goal_tolerance": [ros.JointTolerance("shoulder_pan_joint", 1e-9)]}
+    async with stepped_robot(**QUIET) as robot:
+        await robot.step(10)
+        for status in (CANCELED, ABORTED):
+            uuid, _ = await robot.send_goal(there_and_back(robot.q)[:1], **tight)
+            result = robot.result(uuid)
+            await robot.step(1000)
+            assert robot.host.controller.session.lease is None
+            assert not result.done()
+            if status == CANCELED:
+                await robot.cancel(uuid)
+            else:
+                robot.move(there_and_back(robot.q))
+            assert (await robot.until(result)).status == status
+
+
+async def test_feedback_is_in_the_time_of_the_trajectory():
+    async with stepped_robot(**QUIET) as robot:
+        await robot.step(10)
+        async with robot.other.control("slow") as arm:
+            await arm.set_speed(0.5)
+        uuid, _ = await robot.send_goal(there_and_back(robot.q))
+        began = len(robot.node.published["joint_states"])
+        assert (await robot.until(robot.result(uuid))).status == SUCCEEDED
+        assert len(robot.node.published["joint_states"]) - began > 1900
+        last = robot.node.published[f"{ACTION}/feedback"][-2].feedback
+        assert seconds(last.desired.time_from_start) == pytest.approx(2.0, abs=0.1)
+        assert last.index == 1
+
+
+@pytest.mark.parametrize(("stamp", "ticks"), [(0.0, 500), (0.2, 400), (0.6, 600)])
+async def test_trajectory_starts_at_its_stamp(stamp, ticks):
+    async with stepped_robot(**QUIET) as robot:
+        await robot.step(200)  # 0.4 s
+        goal = [robot.q[0] + 0.05, *robot.q[1:]]
+        robot.move([(0.1, robot.q, STILL), (1.0, goal, STILL)], stamp=stamp)
+        await robot.step(ticks - 40)
+        assert robot.q != pytest.approx(goal, abs=1e-6)
+        await robot.step(60)
+        assert robot.q == pytest.approx(goal, abs=1e-6)
+        robot.move([(0.1, goal, STILL)], stamp=0.1)
+        await robot.step(1)
+        assert "has ended" in robot.node.published["/rosout"][-1].msg
+
+
+async def test_position_command_during_a_trajectory_is_refused_with_a_reason():
+    async with stepped_robot(**QUIET) as robot:
+        await robot.step(10)
+        uuid, _ = await robot.send_goal(there_and_back(robot.q))
+        await robot.step(100)
+        robot.node.send(POSITIONS, ros.Float64MultiArray(data=robot.q))
+        assert (await robot.until(robot.result(uuid))).status == SUCCEEDED
+        (warned,) = robot.node.published["/rosout"]
+        assert "a position command was refused" in warned.msg
 
 
 async def test_tolerances_and_stops_abort_a_goal():
@@ -204,7 +280,7 @@ async def test_trajectory_topic_moves_the_arm():
     async with stepped_robot(**QUIET) as robot:
         await robot.step(10)
         points = there_and_back(robot.q)[:1]
-        robot.node.send(f"{CONTROLLER}/joint_trajectory", trajectory_of(points))
+        robot.move(points)
         await robot.step(700)
         assert robot.q == pytest.approx(points[0][1], abs=1e-6)
 
