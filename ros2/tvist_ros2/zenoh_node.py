@@ -14,6 +14,7 @@ import zenoh
 import zenoh.ext
 from zenoh.handlers import Callback
 
+from tvist_client.errors import NotConnectedError
 from tvist_client.transports.inbox import wake
 from tvist_client.transports.session import close_session, open_session
 from tvist_ros2.cdr import CdrError, decode, encode
@@ -39,16 +40,25 @@ class ZenohNode(Node):
         self._congestion = zenoh.CongestionControl.BLOCK if lossless else zenoh.CongestionControl.DROP
         self._loop = asyncio.get_running_loop()
         self._answering = Tasks()
+        self.token = self._tokens.node()
         # Zenoh withdraws what is no longer referenced.
-        self._kept: list[object] = [session.liveliness().declare_token(self._tokens.node())]
+        self._kept: list[object] = [session.liveliness().declare_token(self.token)]
 
     @classmethod
     async def open(
         cls, endpoint: str, domain: int, namespace: str, name: str, *, lossless: bool = False
     ) -> "ZenohNode":
-        """Connect to a Zenoh router; with `lossless`, publishers wait for subscribers. May raise NotConnectedError."""
+        """Connect to a Zenoh router; with `lossless`, publishers wait for subscribers.
+
+        NotConnectedError if no router answers, or if its rules of access drop the messages of ROS 2.
+        """
         session = await asyncio.to_thread(open_session, endpoint)
-        return cls(session, domain, namespace, name, lossless=lossless)
+        node = cls(session, domain, namespace, name, lossless=lossless)
+        if not await asyncio.to_thread(_seen_from_outside, endpoint, node.token):
+            await node.close()
+            why = "start it as tvist serve --ros2, or give the endpoint of rmw_zenohd"
+            raise NotConnectedError(f"the router at {endpoint} does not pass on messages of ROS 2: {why}")
+        return node
 
     def publisher(self, name: str, of: RosType, qos: Qos = DEFAULT) -> Callable[[Any], None]:
         where = self._key(name, of)
@@ -125,6 +135,15 @@ class ZenohNode(Node):
         token = self._tokens.entity(kind, absolute(self._namespace, name), of, qos)
         self._kept.append(self._session.liveliness().declare_token(token))
         return token
+
+
+def _seen_from_outside(endpoint: str, token: str) -> bool:
+    """Return whether another session at the router sees a node's token."""
+    other = open_session(endpoint)
+    try:
+        return any(other.liveliness().get(token))
+    finally:
+        close_session(other)
 
 
 def _attachment(number: int, identifier: bytes) -> bytes:

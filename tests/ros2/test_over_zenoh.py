@@ -12,12 +12,14 @@ from tests.places import free_endpoint
 from tests.ros2.nodes import ACTION, JOINTS, stepped_robot, trajectory_of
 from zenoh.handlers import Callback
 
+from tvist_client.errors import NotConnectedError
 from tvist_client.transports.inbox import wake
 from tvist_client.transports.session import close_session, open_session
 from tvist_ros2.cdr import decode, encode
 from tvist_ros2.messages import TYPES, ros
 from tvist_ros2.names import key
 from tvist_ros2.zenoh_node import ATTACHMENT, ZenohNode
+from tvist_server.gateways.access import open_access
 from tvist_server.gateways.network import Network
 
 SEND_GOAL, GET_RESULT, TRIGGER = (
@@ -124,6 +126,18 @@ async def test_late_node_gets_what_is_latched_and_sees_every_entity():
         assert answer.success
         kinds = [token.split("/")[5] for token in peer.tokens()]
         assert [kinds.count(kind) for kind in ("NN", "SS", "MS")] == [1, 12, 2]
+
+
+async def test_router_that_drops_messages_of_ros_2_is_named():
+    endpoint = free_endpoint()
+    network = Network([endpoint], {"access_control": open_access(["ur5e"])})
+    try:
+        with pytest.raises(
+            NotConnectedError, match="does not pass on messages of ROS 2: start it as tvist serve"
+        ):
+            await ZenohNode.open(endpoint, 0, "", "tvist_ur5e")
+    finally:
+        network.close()
 
 
 async def test_states_and_time_are_repeated_while_time_stands_still(monkeypatch):

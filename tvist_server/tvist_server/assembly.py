@@ -67,7 +67,8 @@ def check_together(config: ServeConfig, robots: int) -> None:
          f"listen is {own}, and {workers}: Unix sockets are for the server's own processes, so listen on tcp/ or tls/"),
         (config.ros2 and config.security is not None,
          "ros2 and security exclude each other: every ROS 2 node can move the robot, whatever its certificate allows"),
-        (config.ros2 and several, f"ros2 needs one process, and {workers}: run tvist ros2 for each robot instead"),
+        (config.ros2 and several,
+         f"ros2 needs one process, and {workers}: connect to rmw_zenohd, and run tvist ros2 for each robot"),
         (config.ros2 and robots > 1 and config.clock != "realtime",
          "ros2 needs one time for all robots, which in lockstep they do not have: serve one robot per ROS_DOMAIN_ID"),
     ):  # fmt: skip
