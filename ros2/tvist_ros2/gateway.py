@@ -96,10 +96,7 @@ class Gateway:
             self._warn(f"a position command has {given} numbers: must have {joints}")
 
     def _trajectory(self, message: Any) -> None:
-        self._tasks.start(self._move(message))
-
-    async def _move(self, message: Any) -> None:
-        await self._action.start(ros.FollowJointTrajectory_Goal(message))
+        self._tasks.start(self._action.start(ros.FollowJointTrajectory_Goal(message)))
 
     async def _command(self, command: Callable[[Arm], Awaitable[None]], _: Any) -> Any:
         async def controlled() -> None:

@@ -55,9 +55,11 @@ class Mover:
 
     async def begin(self, points: Sequence[TrajectoryPoint]) -> Motion:
         """Start a trajectory; return its motion. RefusedError names the first bad point."""
-        begun: asyncio.Future[Motion] = asyncio.get_running_loop().create_future()
-        self._tasks.start(self._carry_out(points, begun))
-        return await begun
+        async with AsyncExitStack() as held:
+            arm = await held.enter_async_context(self.control())
+            motion = await arm.move_trajectory(points, wait=False)
+            self._tasks.start(self._hold(held.pop_all(), motion))
+        return motion
 
     def stop(self) -> None:
         """Bring the arm to rest on the path of its motion."""
@@ -73,15 +75,9 @@ class Mover:
             with suppress(TvistError):  # it is stopping already
                 await self._robot.request(StopJ(token=self._robot.arm.token))
 
-    async def _carry_out(self, points: Sequence[TrajectoryPoint], begun: asyncio.Future[Motion]) -> None:
-        try:
-            async with self.control() as arm:
-                motion = await arm.move_trajectory(points, wait=False)
-                begun.set_result(motion)
-                await motion.wait_event()
-        except TvistError as error:
-            if not begun.done():
-                begun.set_exception(error)
+    async def _hold(self, control: AsyncExitStack, motion: Motion) -> None:
+        async with control:
+            await motion.wait_event()
 
     async def _follow(self) -> None:
         motion: Motion | None = None

@@ -2,15 +2,16 @@
 
 import asyncio
 from collections.abc import Coroutine
+from typing import Any
 
 
 class Tasks:
     """Starts tasks, and keeps them until they end: the event loop itself does not."""
 
     def __init__(self) -> None:
-        self._running: set[asyncio.Task[None]] = set()
+        self._running: set[asyncio.Task[object]] = set()
 
-    def start(self, work: Coroutine[None, None, None]) -> None:
+    def start(self, work: Coroutine[Any, Any, object]) -> None:
         """Run a coroutine beside the others."""
         task = asyncio.create_task(work)
         self._running.add(task)

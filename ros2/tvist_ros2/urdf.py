@@ -63,12 +63,16 @@ def _origin(of: Element, place: Iterable[float]) -> None:
 
 
 def _draw(link: Element, capsule: Capsule) -> None:
-    """Add a capsule to a link as a cylinder of its length."""
-    length = dist(capsule.start, capsule.end)
-    if length > 0.0:
-        x, y, z = (end - start for start, end in zip(capsule.start, capsule.end, strict=True))
-        middle = [0.5 * sum(ends) for ends in zip(capsule.start, capsule.end, strict=True)]
-        visual = SubElement(link, "visual")
-        _origin(visual, (*middle, 0.0, acos(z / length), atan2(y, x)))
-        size = {"radius": repr(capsule.radius), "length": repr(length + 2.0 * capsule.radius)}
-        SubElement(SubElement(visual, "geometry"), "cylinder", size)
+    """Add a capsule to a link, as a cylinder of its length or a sphere."""
+    length, radius = dist(capsule.start, capsule.end), repr(capsule.radius)
+    x, y, z = (end - start for start, end in zip(capsule.start, capsule.end, strict=True))
+    middle = [0.5 * sum(ends) for ends in zip(capsule.start, capsule.end, strict=True)]
+    turn = (acos(z / length), atan2(y, x)) if length > 0.0 else (0.0, 0.0)
+    for part in ("visual", "collision"):
+        shown = SubElement(link, part)
+        _origin(shown, (*middle, 0.0, *turn))
+        geometry = SubElement(shown, "geometry")
+        if length > 0.0:
+            SubElement(geometry, "cylinder", radius=radius, length=repr(length + 2.0 * capsule.radius))
+        else:
+            SubElement(geometry, "sphere", radius=radius)

@@ -65,6 +65,8 @@ async def test_states_come_every_tick_with_the_clock_and_the_description_once():
         place, turn = flange_of(described.data, dict(zip(JOINTS, state.actual_q, strict=True)))
         assert place == pytest.approx(state.actual_TCP_pose[:3], abs=1e-9)
         assert (turn.inv() * Rotation.from_rotvec(state.actual_TCP_pose[3:])).magnitude() < 1e-9
+        shapes = [shape.tag for shape in ET.fromstring(described.data).findall(".//collision/geometry/*")]  # noqa: S314  it is ours
+        assert shapes == ["cylinder"] * 7
 
 
 async def test_rate_reduces_states_but_not_the_clock():
