@@ -91,6 +91,8 @@ class TrajectoryAction:
     async def start(self, wanted: Any, info: Any = None) -> Goal | None:
         """Start a trajectory once the one before rests; return its goal, or None if it was refused."""
         try:
+            if info is not None and info.goal_id.uuid in self._goals:
+                raise MisuseError("a goal had its identifier before")
             goal = self._newest = Goal(wanted, self._outputs, info)
             async with self._replacing:
                 if self._active is not None:
@@ -118,6 +120,11 @@ class TrajectoryAction:
         elif not goal.motion.ended and (deviation := goal.on_path.violation(state)) is not None:
             self._stop(goal, (ABORTED, PATH_TOLERANCE_VIOLATED, deviation))
 
+    def close(self) -> None:
+        """End the active goal, because the gateway ends."""
+        if self._active is not None:
+            self._end(self._active, (ABORTED, INVALID_GOAL, "the robot left ROS 2"))
+
     def _stop(self, goal: Goal, ending: Ending) -> None:
         """Bring the arm to rest on the path of a goal, which then ends; the first reason counts."""
         if goal.ending is None:
@@ -135,12 +142,10 @@ class TrajectoryAction:
         self._tell_status()
 
     async def _send_goal(self, request: Any) -> Any:
-        now, identifier = self._outputs.now(), request.goal_id.uuid
-        goal = None
-        if identifier not in self._goals:
-            goal = await self.start(request.goal, ros.GoalInfo(request.goal_id, now))
+        now = self._outputs.now()
+        goal = await self.start(request.goal, ros.GoalInfo(request.goal_id, now))
         if goal is not None:
-            self._goals[identifier] = goal
+            self._goals[request.goal_id.uuid] = goal
             if len(self._goals) > REMEMBERED:
                 del self._goals[next(iter(self._goals))]
             self._tell_status()

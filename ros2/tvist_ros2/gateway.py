@@ -51,7 +51,7 @@ class Gateway:
         self._robot, self._name, self._say = robot, name, say
         self._outputs = Outputs(node, info, rate)
         self._log = node.publisher("/rosout", TYPES["rcl_interfaces/msg/Log"], Qos(1000, latched=True))
-        self._warned = "", 0.0
+        self._warned: dict[str, float] = {}  # when each warning was given
         self._tasks = Tasks()
         self._mover = Mover(robot, self._warn)
         self._action = TrajectoryAction(
@@ -77,6 +77,7 @@ class Gateway:
                 self._action.take(state)
         finally:
             repeating.cancel()
+            self._action.close()
             await self._tasks.cancel()
             await self._mover.close()
 
@@ -91,7 +92,7 @@ class Gateway:
     def _position(self, message: Any) -> None:
         given, joints = len(message.data), len(self._outputs.joints)
         if given == joints:
-            self._mover.follow(message.data)
+            self._mover.follow(message.data, self._outputs.tick)
         else:
             self._warn(f"a position command has {given} numbers: must have {joints}")
 
@@ -116,8 +117,9 @@ class Gateway:
     def _warn(self, why: str) -> None:
         """Tell people and `/rosout` what was refused; the same thing only once in some seconds."""
         now = asyncio.get_running_loop().time()
-        if self._warned[0] == why and now < self._warned[1] + SAME_S:
+        self._warned = {said: when for said, when in self._warned.items() if now < when + SAME_S}
+        if why in self._warned:
             return
-        self._warned = why, now
+        self._warned[why] = now
         self._say(why)
         self._log(ros.Log(self._outputs.now(), WARN, self._name, why))

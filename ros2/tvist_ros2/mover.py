@@ -12,6 +12,7 @@ from tvist_ros2.tasks import Tasks
 
 CLIENT = "ros2"  # name of the client that takes control
 LOOKAHEAD = 0.03  # lag behind position commands, the smallest that a robot offers [s]
+PAUSE_TICKS = 500  # ticks without position commands after which they are followed again after a stop: 1 s
 
 Warn = Callable[[str], None]  # tells people what was refused, or why something ended
 
@@ -25,6 +26,8 @@ class Mover:
         self._held, self._users = AsyncExitStack(), 0
         self._tasks = Tasks()
         self._following = False
+        self._stopped = False  # whether position commands are ignored until they pause
+        self._commanded = 0  # tick of the latest position command
         self._target: Sequence[float] | None = None
         self._news = asyncio.Event()
 
@@ -45,8 +48,15 @@ class Mover:
                 if self._users == 0:
                     await self._held.aclose()
 
-    def follow(self, q: Sequence[float]) -> None:
-        """Follow a posture until the arm rests there, or until the next one."""
+    def follow(self, q: Sequence[float], tick: int) -> None:
+        """Follow a posture until the arm rests there, or until the next one.
+
+        After a stop, nobody expects the arm to move because commands go on: they must pause first.
+        """
+        self._stopped = self._stopped and tick < self._commanded + PAUSE_TICKS
+        self._commanded = tick
+        if self._stopped:
+            return
         self._target = q
         self._news.set()
         if not self._following:
@@ -85,18 +95,32 @@ class Mover:
         async with AsyncExitStack() as held:
             try:
                 arm = await held.enter_async_context(self.control())
-                while self._target is not None or not (motion is None or motion.ended):
+                while True:
                     self._news.clear()
-                    if self._target is None:
+                    q, self._target = self._target, None
+                    if motion is not None and motion.ended and (q is None or motion.stopped is not None):
+                        break
+                    if q is None:
                         await self._news.wait()
                     else:
-                        q, self._target = self._target, None
-                        motion = await arm.servo_j(q, lookahead=LOOKAHEAD, shaped=True)
-                if motion is not None and motion.stopped is not None:
-                    self._warn(f"position commands were stopped: {motion.stopped.why}")
+                        motion = await self._aim(arm, q, motion)
+                if motion.stopped is not None:
+                    self._stopped = True
+                    again = "they are followed again once they have paused for 1 s"
+                    self._warn(f"position commands were stopped: {motion.stopped.why}; {again}")
             except TvistError as error:
                 self._target = None
                 self._warn(f"a position command was refused: {error}")
             finally:
                 self._following = False  # before control is given back, so that a command starts anew
                 forget()
+
+    async def _aim(self, arm: Arm, q: Sequence[float], motion: Motion | None) -> Motion:
+        """Follow a posture; if it is refused, the motion before continues."""
+        try:
+            return await arm.servo_j(q, lookahead=LOOKAHEAD, shaped=True)
+        except TvistError as error:
+            if motion is None:
+                raise
+            self._warn(f"a position command was refused: {error}")
+            return motion

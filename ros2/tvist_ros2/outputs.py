@@ -46,6 +46,11 @@ class Outputs:
             return _stamp(time.time_ns())
         return _stamp(0 if self.latest is None else round(1e9 * self.latest.timestamp))
 
+    @property
+    def tick(self) -> int:
+        """Tick of the latest state; 0 before the first."""
+        return 0 if self.latest is None else self.latest.tick
+
     def points_of(self, trajectory: Any) -> list[TrajectoryPoint]:
         """Return the points of a JointTrajectory that starts now; see `trajectory.points_of`."""
         q = [] if self.latest is None else self.latest.target_q
