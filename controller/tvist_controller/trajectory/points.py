@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from tvist_controller.trajectory.base import Floats, MotionLimits
+from tvist_controller.trajectory.base import Floats, MotionLimits, TimeLaw
 from tvist_controller.trajectory.spline import between, evaluate, hermite
 from tvist_plant.plant import PERIOD
 
@@ -13,16 +13,13 @@ LEAST = (1e-3, 1e-2, 0.1)
 STANDING = 2  # number of samples at rest before the start, and after the end
 
 
-class PointLaw:
+class PointLaw(TimeLaw):
     """Joint positions through points at given times.
 
     At each tick they are on straight lines between points without velocities, on cubics between points with
     velocities, on quintics with accelerations too. Between ticks, which play only while the time rate is not 1, they
     are on a cubic through the positions at the ticks: only those are checked.
     """
-
-    begins = 0.0
-    brakes_at = 0.0  # not known
 
     def __init__(
         self,
