@@ -133,6 +133,10 @@ class TimeLaw(ABC):
     def at(self, time: float) -> tuple[list[float], list[float], list[float]]:
         """Return the parameter, its velocity and its acceleration at a time [s], m each."""
 
+    def position(self, time: float) -> Floats:
+        """Return the parameter at a time [s], shape (m,)."""
+        return np.array(self.at(time)[0])
+
 
 @dataclass(frozen=True)
 class BrakingForecast:

@@ -159,12 +159,10 @@ class PlannedMotion(Trajectory):
         return late
 
     def _share_at(self, time: float) -> float:
-        (start, *_), (now, *_), (end, *_) = (
-            self.law.at(moment) for moment in (self.law.begins, time, self.duration)
-        )
+        start, now, end = map(self.law.position, (self.law.begins, time, self.duration))
         leading = self.path.leading
         way = end[leading] - start[leading]
-        return (now[leading] - start[leading]) / way if way != 0.0 else 1.0
+        return float(now[leading] - start[leading]) / way if way != 0.0 else 1.0
 
     def states(self, times: Floats) -> tuple[Floats, Floats, Floats]:
         """Return joint positions, velocities and accelerations at k times at full speed [s], each (k, n)."""
@@ -183,7 +181,7 @@ class PlannedMotion(Trajectory):
             curve = [self.path.paced(x, xd, xdd, most) for x, xd, xdd in states]
             self._since, self._ticks = time + self._pace.advance(self.speed, curve), 0
         time = self.time
-        return self.path.end if time >= self.duration else np.array(self.law.at(time)[0])
+        return self.path.end if time >= self.duration else self.law.position(time)
 
     def go_on(self, longer: "PlannedMotion") -> None:
         """Continue as a longer motion along a `SplineCurve` that is equal until some ticks from now."""

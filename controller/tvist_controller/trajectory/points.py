@@ -54,6 +54,13 @@ class PointLaw(TimeLaw):
         q, qd, qdd = between(before, start, end, then, ticks - int(ticks))
         return q.tolist(), (qd / PERIOD).tolist(), (qdd / PERIOD**2).tolist()
 
+    def position(self, time: float) -> Floats:
+        """Return the joint positions at a time [s], at ticks without interpolation, shape (n,) [rad]."""
+        ticks = time / PERIOD
+        number = round(ticks)
+        at_tick = abs(ticks - number) < 1e-6
+        return self.samples[STANDING + number] if at_tick else super().position(time)
+
     def after(self, time: float) -> Floats:
         """Return the positions from a time on [s], one per tick, shape (k, n) [rad]."""
         return self.samples[STANDING + int(time / PERIOD) :]
