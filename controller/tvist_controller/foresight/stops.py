@@ -200,7 +200,7 @@ class StopPlanner:
         asked, *others = self._ladder(wanted)
         ladder = [asked, *(acceleration for acceleration in others if fastest <= LONGEST * acceleration)]
         tries = [(acceleration, 0.5 * self.jerk) for acceleration in ladder]
-        tries += [(asked, jerk) for jerk in SOFT]
+        tries += [(min(asked, math.sqrt(fastest * jerk)), jerk) for jerk in SOFT]
         torque = StopTorque(self._dynamics, state, self._torque)
         peaks = cache(torque.peaks)
 
