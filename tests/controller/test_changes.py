@@ -27,7 +27,7 @@ from tvist_protocol.replies import Accepted, Done
 from tvist_protocol.simulation import SimulationReset
 from tvist_protocol.transitions import Activity
 
-from .robots import FITTING, PAPER, Q1, Q2, Q3, UR5E, H, Robot, bits, calibration, without_arm
+from .robots import FITTING, PAPER, Q1, Q2, Q3, UR5E, H, NoArm, Robot, bits, calibration, without_arm
 from .test_modes import at
 
 DISC = paper_payload(UR5E)
@@ -101,6 +101,18 @@ def test_shaper_estimator_and_payload_changes_in_motion_are_reproducible(activit
         assert activity is not Activity.MOVING or robot.states[-1].target_q == pytest.approx(Q3, abs=1e-6)
         assert robot.kinds().count("shaper_changed") == 2
     assert bits(robots[0].states) == bits(robots[1].states)
+
+
+@pytest.mark.parametrize("every", [1, 2, 3])
+def test_a_move_ends_even_if_the_shaper_changes_all_the_time(every):
+    robot = Robot(plant=NoArm())
+    assert isinstance(robot.send(c.MoveJ, q=tuple(Q1 + 0.05)), Accepted)
+    while robot.controller.motion.activity is Activity.MOVING:
+        assert robot.send(c.SetShaper, name=("none", "zv")[len(robot.states) // every % 2]) == Done()
+        robot.tick(every)
+        assert len(robot.states) < 500
+    assert "motion_done" in robot.kinds()
+    assert robot.states[-1].target_q == pytest.approx(Q1 + 0.05, abs=1e-9)
 
 
 @pytest.mark.parametrize("name", [*FITTING[:4], "none"])

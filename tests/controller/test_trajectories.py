@@ -1,5 +1,6 @@
 """Trajectories are played as scipy interpolates them, or refused as a whole; stops, pauses and shaping on them."""
 
+import re
 from functools import cache
 
 import numpy as np
@@ -161,6 +162,17 @@ def test_a_stop_near_the_torque_limits_is_quick_and_keeps_them(moment):
     assert (np.abs(torques(UR5E, paper_payload(UR5E), stopped)).max(axis=0) <= LIMITS.torque).all()
     assert stopped[:, 1].max() - stopped[-1, 1] < 0.02  # it hardly swings back
     assert H * resting_after(stopped) < 0.6
+
+
+def test_a_stop_near_the_torque_limits_names_the_deceleration_that_it_reaches():
+    robot = Robot(plant=NoArm(), q=RAISED, shaper="none")
+    points = swings((0.7, -0.4), (1.4, -0.9), (2.1, -0.4), (2.8, -0.9))
+    assert isinstance(robot.send(MoveTrajectory, points=points), Accepted)
+    speed = abs(robot.tick(255).target_qd[1])
+    robot.send(c.Stop, deceleration=30.0)
+    robot.until_rest()
+    told = re.search("deceleration is (.*) rad/s², limited from 30", robot.told("motion_stopped")[0].why)
+    assert float(told[1]) == pytest.approx(np.sqrt(10.0 * speed), rel=0.02)
 
 
 def test_the_way_between_ticks_is_as_smooth_as_the_checked_one():

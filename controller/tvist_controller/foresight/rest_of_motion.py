@@ -17,7 +17,7 @@ from tvist_plant.description import Payload
 from tvist_plant.plant import PERIOD
 from tvist_shaping.base import Filter
 
-FORESEEN = 2000  # ticks of the rest of a trajectory up to which it is checked shaped too, by simulation
+FORESEEN = 2000  # ticks of a rest up to which it is checked shaped, too; shaping may cut bends of longer ones
 MARGIN = 0.8
 """Fraction of the acceleration that torque permits at the start of a stop; the margin is for changes on the way [-]."""
 

@@ -79,6 +79,7 @@ may brake slightly harder than its reference [-]."""
 TURN_BACK_SPEED = 3e-3  # speed below which interpolation may turn a shaped motion back slightly [rad/s]
 SLOW = 0.05  # least speed in calculations of stops on a curve, so that no slow motion stops abruptly [rad/s]
 LONG_STOP = 0.2  # duration above which a quicker stop is sought with more calculation [s]
+LONGEST = 0.6  # largest time to slow down that is tried on a curve, unless a deceleration is requested [s]
 SOFT = (20.0, 10.0)  # jerks of the last stops tried, which torque at its limit still permits [rad/s^3]
 SOON = 0.02  # a motion that brakes later than this is by then ahead of a stop [s]
 COUNTED = 0.9  # fraction of its velocity that a motion is assumed to keep until it brakes [-]
@@ -196,8 +197,12 @@ class StopPlanner:
         None for a motion about to rest. Arguments as in `under`; the motion is simulated as far as the stops need it.
         """
         fastest = max(float(np.abs(state.qd).max()), SLOW)
-        tries = [(acceleration, 0.5 * self.jerk) for acceleration in self._ladder(wanted)]
-        tries += [(tries[0][0], jerk) for jerk in SOFT]
+        asked, *others = self._ladder(wanted)
+        ladder = [asked, *(acceleration for acceleration in others if fastest <= LONGEST * acceleration)]
+        tries = [(acceleration, 0.5 * self.jerk) for acceleration in ladder]
+        tries += [(min(asked, math.sqrt(fastest * jerk)), jerk) for jerk in SOFT]
+        torque = StopTorque(self._dynamics, state, self._torque)
+        peaks = cache(torque.peaks)
 
         @cache
         def stop(acceleration: float, jerk: float) -> SlowedStop:
@@ -208,18 +213,18 @@ class StopPlanner:
 
         def quickest(torque: StopTorque) -> SlowedStop | None:
             stops = (made for made in starmap(stop, tries) if made.hardest <= self.highest)
-            within = (made for made in stops if torque.excess(made) <= 1.0)
+            within = (made for made in stops if torque.excess(peaks(made)) <= 1.0)
             return _first(within, lambda made, rebound: torque.holds(made, rebound=rebound))
 
         ahead.until(2)
         if len(ahead.samples) < 4:
             return None
-        found = quickest(StopTorque(self._dynamics, state, self._torque))
+        found = quickest(torque)
         if found is not None and found.duration <= LONG_STOP:
             return found
-        asked = torque_along(self._dynamics, np.array(ahead.references))
-        torque = StopTorque(self._dynamics, state, self._torque, asked)
-        return quickest(torque) or min(starmap(stop, tries), key=torque.excess)
+        needed = torque_along(self._dynamics, np.array(ahead.references))
+        relaxed = StopTorque(self._dynamics, state, self._torque, needed)
+        return quickest(relaxed) or min(starmap(stop, tries), key=lambda made: relaxed.excess(peaks(made)))
 
     def _behind(self, stop: PathStop | SlowedStop, along: Sequence[float]) -> bool:
         """Return whether a stop is never ahead of a motion; `along` is the motion's distance at each tick."""

@@ -161,10 +161,14 @@ class StopTorque:
         within &= (np.maximum(begun, ended) <= self._most).all(axis=1)
         return within
 
-    def excess(self, stop: AnyStop) -> float:
-        """Return the largest ratio of a torque at any tick of a stop to what `holds` permits [-]."""
+    def peaks(self, stop: AnyStop) -> Floats:
+        """Return the largest torque of each joint at any tick of a stop, shape (n,) [N m]."""
         times = PERIOD * np.arange(1.0, math.ceil(stop.duration / PERIOD) + 1.0)
-        return float((self._torques(stop, times)[2] / self._share).max(initial=0.0))
+        return np.asarray(self._torques(stop, times)[2].max(axis=0, initial=0.0))
+
+    def excess(self, peaks: Floats) -> float:
+        """Return the largest ratio of these torques to what `holds` permits [-]."""
+        return float((peaks / self._share).max())
 
     def _torques(self, stop: AnyStop, times: Floats) -> tuple[Floats, Floats, Floats]:
         """Return positions, torques and largest absolute torques of any body at k times, each (k, n)."""

@@ -72,7 +72,10 @@ class LineFilter:
         """Change the filter within the limits of the motion; during a transition, the new filter waits."""
         fade = self._fade
         if fade is None or fade.share == 0.0:
-            self._fade = self._fade_to(self.tvist if fade is None else fade.old, tvist)
+            old = self.tvist if fade is None else fade.old
+            self._fade = self._fade_to(old, tvist)
+            if fade is not None and old.settled and tvist.settled:
+                self._fade = None  # otherwise, a change at each tick would keep the line from resting
         else:
             tvist.take_over(self.tvist)
         self.tvist = tvist

@@ -120,6 +120,24 @@ class JointLine(Path):
         return CheckedMotion(lambda share: start + share * way, way)
 
 
+class TimeLaw(ABC):
+    """A path's parameter as a function of time."""
+
+    limits: MotionLimits  # largest velocity, acceleration and jerk of any entry
+    duration: float  # time at which the motion rests [s]
+    begins = 0.0  # time from which the law is known [s]
+    brakes_at = 0.0  # time at which the motion starts braking; 0 if unknown [s]
+    moments: Floats  # times at which velocity or acceleration may be largest [s]
+
+    @abstractmethod
+    def at(self, time: float) -> tuple[list[float], list[float], list[float]]:
+        """Return the parameter, its velocity and its acceleration at a time [s], m each."""
+
+    def position(self, time: float) -> Floats:
+        """Return the parameter at a time [s], shape (m,)."""
+        return np.array(self.at(time)[0])
+
+
 @dataclass(frozen=True)
 class BrakingForecast:
     """When and how hard a trajectory will brake, in its path's parameter, as known without simulation."""

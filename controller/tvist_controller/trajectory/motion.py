@@ -7,9 +7,8 @@ from typing import Self
 import numpy as np
 import ruckig
 
-from tvist_controller.trajectory.base import BrakingForecast, Floats, MotionLimits, Path, Trajectory
+from tvist_controller.trajectory.base import BrakingForecast, Floats, MotionLimits, Path, TimeLaw, Trajectory
 from tvist_controller.trajectory.points import PointLaw
-from tvist_controller.trajectory.retiming import RetimedLaw
 from tvist_controller.trajectory.spline import SplineCurve
 from tvist_plant.plant import PERIOD
 
@@ -82,16 +81,14 @@ class TimeScaling:
 
 
 LOOK_AHEAD = 2.0  # ticks that a rate change looks ahead on the path
-
 LONGEST_LOOK = 1500  # ticks over which a motion is compared with its pause; longer ones are not about to end
 SOONER = 25  # ticks that a pause must save to be worthwhile
 
 SURELY = 0.12
 """If the motion brakes later than this plus the pause's extra time, the pause is certainly sooner [s]."""
-LATEST = 0.3  # time that a pause on a curve may take beyond that for its speed [s]
 
 
-class DoubleS:
+class DoubleS(TimeLaw):
     """Time-optimal motion from rest to rest within limits, shape (m,) [rad], all entries in phase.
 
     The entry with the longest distance determines the duration (Biagiotti and Melchiorri 2008, ch. 3.4). With
@@ -116,13 +113,11 @@ class DoubleS:
                 f"velocity {limits.velocity:g}, acceleration {limits.acceleration:g}, jerk {limits.jerk:g}"
             ) from error
         self.limits = limits
-        self.begins = 0.0  # time from which the law is known [s]
         self.duration = float(self._trajectory.duration)  # duration from rest to rest [s]
         # Motion from rest to rest is symmetric in time.
         leading = self._trajectory.profiles[0][int(np.argmax(np.abs(end - start)))]
         self.brakes_at = self.duration - sum(leading.t[:3])  # time at which the motion starts braking [s]
-        self.moments: Floats = np.cumsum(leading.t)
-        """Times at which the jerk changes, with possibly largest velocity or acceleration [s]."""
+        self.moments = np.cumsum(leading.t)  # times at which the jerk changes [s]
 
     def at(self, time: float) -> tuple[list[float], list[float], list[float]]:
         """Return the parameter [rad], its velocity and acceleration [rad, s] at a time [s], m each."""
@@ -143,14 +138,13 @@ class PlannedMotion(Trajectory):
     def __init__(
         self,
         path: Path,
-        law: DoubleS | RetimedLaw | PointLaw,  # from the path's start to its end
+        law: TimeLaw,  # from the path's start to its end
         speed: float = 1.0,  # initial rate of its time relative to the clock's [-]
         agility: MotionLimits | None = None,  # of a change of the rate; None for those of the law
     ) -> None:
         self.path, self.law = path, law
         self.agility = law.limits if agility is None else agility  # limits of a rate change
-        self.limits = law.limits
-        self.duration = law.duration  # duration at full speed [s]
+        self.limits, self.duration = law.limits, law.duration  # duration at full speed [s]
         self.speed = speed  # target time rate, 0 to 1 [-]
         self._pace = TimeScaling(self.agility, speed)
         # Time on the path, as whole ticks since the rate last changed, so that rounding errors do not add up.
@@ -165,12 +159,10 @@ class PlannedMotion(Trajectory):
         return late
 
     def _share_at(self, time: float) -> float:
-        (start, *_), (now, *_), (end, *_) = (
-            self.law.at(moment) for moment in (self.law.begins, time, self.duration)
-        )
+        start, now, end = map(self.law.position, (self.law.begins, time, self.duration))
         leading = self.path.leading
         way = end[leading] - start[leading]
-        return (now[leading] - start[leading]) / way if way != 0.0 else 1.0
+        return float(now[leading] - start[leading]) / way if way != 0.0 else 1.0
 
     def states(self, times: Floats) -> tuple[Floats, Floats, Floats]:
         """Return joint positions, velocities and accelerations at k times at full speed [s], each (k, n)."""
@@ -189,7 +181,7 @@ class PlannedMotion(Trajectory):
             curve = [self.path.paced(x, xd, xdd, most) for x, xd, xdd in states]
             self._since, self._ticks = time + self._pace.advance(self.speed, curve), 0
         time = self.time
-        return self.path.end if time >= self.duration else np.array(self.law.at(time)[0])
+        return self.path.end if time >= self.duration else self.law.position(time)
 
     def go_on(self, longer: "PlannedMotion") -> None:
         """Continue as a longer motion along a `SplineCurve` that is equal until some ticks from now."""
@@ -213,16 +205,14 @@ class PlannedMotion(Trajectory):
     @property
     def forecast(self) -> BrakingForecast | None:
         """Forecast of the motion; the time of braking is known only at constant rate."""
-        time, rate = self.time, self._pace.rate
-        known = rate > 0.0 and self.steady
         limits = self.limits if self.steady else self.agility
-        return BrakingForecast(
-            self.path,
-            self.path.end,
-            limits.acceleration,
-            limits.jerk,
-            max(self.law.brakes_at - time, 0.0) / rate if known else 0.0,
-        )
+        return BrakingForecast(self.path, self.path.end, limits.acceleration, limits.jerk, self._unbraked)
+
+    @property
+    def _unbraked(self) -> float:
+        """Time before the motion starts braking; 0 if the rate changes [s]."""
+        known = self.rate > 0.0 and self.steady
+        return max(self.law.brakes_at - self.time, 0.0) / self.rate if known else 0.0
 
     @property
     def steady(self) -> bool:
@@ -254,15 +244,12 @@ class PlannedMotion(Trajectory):
 
     def _pays(self, paused: Self, acceleration: float) -> bool:
         """Return whether the motion stands noticeably sooner if it is paused."""
-        if (forecast := self.forecast) is None:
-            longest = self.limits.velocity / acceleration + LATEST
-            return self.time + self.rate * longest < self.duration or _stands_sooner(paused, self.fork())
         most = self.limits.acceleration  # of the motion's own braking
         longer = self.velocity * (1.0 / acceleration - 1.0 / most) + 2.0 * most / self.limits.jerk
         hardest = self.agility.acceleration <= most
-        if forecast.steady == 0.0 and self.rate == 1.0 and self.steady and hardest:
+        if self._unbraked == 0.0 and self.rate == 1.0 and self.steady and hardest:
             return False  # the motion already brakes as hard as it can
-        return forecast.steady >= longer + SURELY or _stands_sooner(paused, self.fork())
+        return self._unbraked >= longer + SURELY or _stands_sooner(paused, self.fork())
 
     def release(self, speed: float) -> None:
         """Resume after a pause at a rate [-]."""
@@ -300,6 +287,11 @@ class TimedMotion(PlannedMotion):
     def bearing(self, q: Floats) -> Floats:  # noqa: ARG002  the law knows the way
         """Return the velocity of the law."""
         return np.array(self.law.at(self.time)[1])
+
+    def _pays(self, paused: Self, acceleration: float) -> bool:
+        """Return whether the motion ends later than a pause even from its largest velocity, or if simulated."""
+        longest = self.limits.velocity / acceleration + SURELY
+        return self.time + self.rate * longest < self.duration or _stands_sooner(paused, self.fork())
 
 
 def quickest_motion(

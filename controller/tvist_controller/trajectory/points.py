@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from tvist_controller.trajectory.base import Floats, MotionLimits
+from tvist_controller.trajectory.base import Floats, MotionLimits, TimeLaw
 from tvist_controller.trajectory.spline import between, evaluate, hermite
 from tvist_plant.plant import PERIOD
 
@@ -13,16 +13,13 @@ LEAST = (1e-3, 1e-2, 0.1)
 STANDING = 2  # number of samples at rest before the start, and after the end
 
 
-class PointLaw:
+class PointLaw(TimeLaw):
     """Joint positions through points at given times.
 
     At each tick they are on straight lines between points without velocities, on cubics between points with
     velocities, on quintics with accelerations too. Between ticks, which play only while the time rate is not 1, they
     are on a cubic through the positions at the ticks: only those are checked.
     """
-
-    begins = 0.0
-    brakes_at = 0.0  # not known
 
     def __init__(
         self,
@@ -56,6 +53,13 @@ class PointLaw:
         before, start, end, then = self.samples[first : first + 4]
         q, qd, qdd = between(before, start, end, then, ticks - int(ticks))
         return q.tolist(), (qd / PERIOD).tolist(), (qdd / PERIOD**2).tolist()
+
+    def position(self, time: float) -> Floats:
+        """Return the joint positions at a time [s], at ticks without interpolation, shape (n,) [rad]."""
+        ticks = time / PERIOD
+        number = round(ticks)
+        at_tick = abs(ticks - number) < 1e-6
+        return self.samples[STANDING + number] if at_tick else super().position(time)
 
     def after(self, time: float) -> Floats:
         """Return the positions from a time on [s], one per tick, shape (k, n) [rad]."""

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tvist_controller._compiled import compiled
-from tvist_controller.trajectory.base import Floats, MotionLimits
+from tvist_controller.trajectory.base import Floats, MotionLimits, TimeLaw
 
 TOOL_SHARE = 0.25
 """Fraction of the shaper's window for which tool limits hold [-]. The speed changes so little within it that the shaped
@@ -134,7 +134,7 @@ def flatten_peaks(edges: Floats, b: Floats, ramp: float, known: int) -> Floats: 
     return out
 
 
-class RetimedLaw:
+class RetimedLaw(TimeLaw):
     """Time law of a curve's parameter: moving mean over `ramp` seconds of a motion with stepped acceleration.
 
     Before the mean, acceleration changes only at the edges (c + 1,). There ṡ² is `b`, which is 0 at the last
@@ -165,6 +165,8 @@ class RetimedLaw:
         self.begins = 0.0 if b[0] == 0.0 else (start + ramp) / rate  # time from which the law is known [s]
         braking = int(np.flatnonzero(accelerations < 0.0)[0])
         self.brakes_at = float(times[braking]) / rate  # time at which the motion starts braking [s]
+        # each edge, half a ramp and a ramp later
+        self.moments = np.concatenate((times, times + 0.5 * ramp, times + ramp)) / rate
         changes = np.concatenate((times + SHORTLY, times + ramp - SHORTLY))
         changes = changes if b[0] == 0.0 else changes[changes >= start + ramp]
         jerk = (
@@ -172,12 +174,6 @@ class RetimedLaw:
         )
         most = float(np.abs(accelerations).max())
         self.limits = MotionLimits(float(speeds.max()) * rate, most * rate**2, jerk * rate**3)
-
-    @property
-    def moments(self) -> Floats:
-        """Times when velocity or acceleration may be largest: each edge, half a ramp and a ramp later [s]."""
-        times = self._times[1:]
-        return np.concatenate((times, times + 0.5 * self.ramp, times + self.ramp)) / self.rate
 
     def slowed(self, duration: float) -> "RetimedLaw":
         """Return the law stretched to a longer duration [s]."""
