@@ -6,10 +6,11 @@ from typing import Any
 
 from msgspec import Struct
 
-from tvist_ros2.messages import fields_of, parts_of, ros
+from tvist_ros2.messages import FIELDS, parts_of, ros
 
 HEADER = b"\x00\x01\x00\x00"
 """Identifies plain CDR, little-endian; the last two bytes are options. Values are aligned relative to its end."""
+LARGEST = 1_000_000  # size beyond which decoding would take too long [byte]; robots take no such trajectory
 _CODES = {
     "bool": "?", "int8": "b", "uint8": "B", "uint16": "H", "int32": "i", "uint32": "I", "float64": "d",
 }  # fmt: skip
@@ -29,7 +30,11 @@ def encode(message: Struct) -> bytes:
 def decode(kind: type[Struct], data: bytes) -> Any:
     """Decode a message of a type, or raise CdrError; ignore bytes after its end."""
     if data[:2] != HEADER[:2]:
-        raise CdrError(f"{kind.__name__} begins with {data[:2].hex()}: must begin with {HEADER[:2].hex()}")
+        raise CdrError(
+            f"{kind.__name__} begins with {data[:2].hex()!r}: must begin with 0001 (little-endian)"
+        )
+    if len(data) > LARGEST:
+        raise CdrError(f"{kind.__name__} has {len(data)} bytes: must have at most {LARGEST}")
     try:
         message, _ = _read(data[4:], 0, kind.__name__)
     except (struct.error, UnicodeDecodeError) as error:
@@ -54,15 +59,11 @@ def _write(out: bytearray, kind: str, value: Any) -> None:
             out += bytes(-len(out) % _form(inner, 1).size) + form.pack(*values)
     elif inner == "string":
         for text in values:
-            content = text.encode() + b"\x00"
-            _write(out, "uint32", len(content))
-            out += content
+            _write(out, "uint8[]", text.encode() + b"\x00")
     else:
         for message in values:
-            for field_kind, name in fields_of(inner):
+            for field_kind, name in FIELDS[inner]:
                 _write(out, field_kind, getattr(message, name))
-            if not fields_of(inner):  # an empty message is one byte
-                out += b"\x00"
 
 
 def _read(data: bytes, at: int, kind: str) -> tuple[Any, int]:
@@ -72,7 +73,8 @@ def _read(data: bytes, at: int, kind: str) -> tuple[Any, int]:
     if several and size is None:
         count, at = _read(data, at, "uint32")
     # Every entry has at least one byte; a wrong number must cost neither time nor memory.
-    _check_room(data, at, count)
+    if at + count > len(data):
+        raise struct.error(f"{count} entries from byte {at} on are more than the message has")
     values: list[Any] = []
     if inner in _CODES:
         if count:
@@ -80,23 +82,15 @@ def _read(data: bytes, at: int, kind: str) -> tuple[Any, int]:
             values, at = list(form.unpack_from(data, at)), at + form.size
     elif inner == "string":
         for _ in range(count):
-            length, at = _read(data, at, "uint32")
-            _check_room(data, at, length)
-            values.append(data[at : at + max(length - 1, 0)].decode())
-            at += length
+            text, at = _read(data, at, "uint8[]")
+            values.append(text[:-1].decode())
     else:
         for _ in range(count):
             fields = []
-            for field_kind, _ in fields_of(inner):
+            for field_kind, _ in FIELDS[inner]:
                 field, at = _read(data, at, field_kind)
                 fields.append(field)
             values.append(getattr(ros, inner)(*fields))
-            at += not fields
     if several:
         return bytes(values) if inner == "uint8" else values, at
     return values[0], at
-
-
-def _check_room(data: bytes, at: int, size: int) -> None:
-    if at + size > len(data):
-        raise struct.error(f"{size} entries from byte {at} on are more than the message has")

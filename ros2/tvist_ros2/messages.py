@@ -8,8 +8,6 @@ from typing import Any, NamedTuple
 
 from msgspec import defstruct
 
-_NUMBERS = {"bool": False, "float64": 0.0}  # the default of each type that is no integer
-
 
 class RosType(NamedTuple):
     """Type of a topic or service."""
@@ -20,11 +18,6 @@ class RosType(NamedTuple):
     """Class of a topic's messages, or of a service's requests."""
     response: Any = None
     """Class of a service's responses; None for a topic."""
-
-
-def fields_of(message: str) -> tuple[tuple[str, str], ...]:
-    """Return type and name of each field of a message."""
-    return _FIELDS[message]
 
 
 @cache
@@ -61,12 +54,12 @@ def _default(kind: str, known: dict[str, Any]) -> Any:
         return []
     if inner in known:
         return known[inner]()
-    return "" if inner == "string" else _NUMBERS.get(inner, 0)
+    return "" if inner == "string" else 0
 
 
 def _classes() -> dict[str, Any]:
     known: dict[str, Any] = {}
-    for name, fields in _FIELDS.items():
+    for name, fields in FIELDS.items():
         known[name] = defstruct(
             name, [(field, Any, _default(kind, known)) for kind, field in fields], frozen=True
         )
@@ -76,21 +69,18 @@ def _classes() -> dict[str, Any]:
 def _types() -> Iterator[RosType]:
     for name, known in map(str.split, _lines("hashes.txt")):
         own = name.rpartition("/")[2]
-        if own in _FIELDS:
+        if own in FIELDS:
             yield RosType(name, known, getattr(ros, own))
         else:
             yield RosType(name, known, getattr(ros, f"{own}_Request"), getattr(ros, f"{own}_Response"))
 
 
-_FIELDS = dict(_fields())
+FIELDS = dict(_fields())
+"""Type and name of each field of a message, by the message's name."""
 ros = SimpleNamespace(**_classes())
 """The classes of the messages, by their names without the package."""
 TYPES = {kind.name: kind for kind in _types()}
 """The types of topics and services, by their names."""
 FEEDBACK = TYPES["control_msgs/action/FollowJointTrajectory_FeedbackMessage"]
-JAZZY_FEEDBACK = RosType(
-    FEEDBACK.name,
-    "80398fcb9674a79081a9906e2ccf0c804dd7cb15e22e362e606ee87186beab71",
-    ros.JazzyFeedbackMessage,
-)
+JAZZY_FEEDBACK = TYPES["control_msgs/action/JazzyFeedbackMessage"]._replace(name=FEEDBACK.name)
 """The type of the feedback before control_msgs 6.3, which brought two more fields."""

@@ -41,7 +41,7 @@ class Tokens:
 
     def __init__(self, domain: int, session: str, namespace: str, node: str) -> None:
         self._start = f"@ros2_lv/{domain}/{session}/0"
-        self._owner = f"%/{_flat(namespace) or '%'}/{node}"
+        self._owner = f"%/{namespace.replace('/', '%') or '%'}/{node}"
         self._numbers = count()
 
     def node(self) -> str:
@@ -50,11 +50,8 @@ class Tokens:
 
     def entity(self, kind: Kind, name: str, of: RosType, qos: Qos = DEFAULT) -> str:
         """Return the token of a publisher, a subscription or a service with an absolute name."""
-        return f"{self._start}/{next(self._numbers)}/{kind}/{self._owner}/{_flat(name)}/{_dds(of)}/{qos}"
-
-
-def _flat(name: str) -> str:
-    return name.replace("/", "%")
+        what = f"{name.replace('/', '%')}/{_dds(of)}/{qos}"
+        return f"{self._start}/{next(self._numbers)}/{kind}/{self._owner}/{what}"
 
 
 def _dds(of: RosType) -> str:
