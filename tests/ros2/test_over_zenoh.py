@@ -21,6 +21,7 @@ from tvist_ros2.names import key
 from tvist_ros2.zenoh_node import ATTACHMENT, ZenohNode
 from tvist_server.gateways.access import open_access
 from tvist_server.gateways.network import Network
+from tvist_server.gateways.ros2 import Ros2Gateway
 
 SEND_GOAL, GET_RESULT, TRIGGER = (
     TYPES[name]
@@ -160,6 +161,14 @@ async def test_served_robot_is_a_ros_2_robot():
         finally:
             close_session(peer.session)
         assert served.end(signal.SIGINT) == 0
+
+
+async def test_server_tells_that_its_gateway_has_ended():
+    told = asyncio.Queue()
+    gateway = Ros2Gateway("nowhere", "ur5e", "", told.put_nowait)
+    await gateway.open()
+    assert "ended with exit code 1" in await told.get()
+    await gateway.shut()
 
 
 @pytest.mark.parametrize(

@@ -152,7 +152,7 @@ class Server:
             gateways.append(interfaces)
         if config.ros2:
             place = within(config.namespace or "", name)
-            gateways.append(Ros2Gateway(config.reached, place, name if config.robots else ""))
+            gateways.append(Ros2Gateway(config.reached, place, name if config.robots else "", robot.warn))
         if self.metrics is not None:
             gateways.append(
                 self.metrics.add(MetricsGateway(config.namespace or "", name, lambda: robot.newest))
