@@ -53,6 +53,7 @@ class Gateway:
         self._log = node.publisher("/rosout", TYPES["rcl_interfaces/msg/Log"], Qos(1000, latched=True))
         self._warned: dict[str, float] = {}  # when each warning was given
         self._tasks = Tasks()
+        node.warn = self._warn
         self._mover = Mover(robot, self._warn)
         self._action = TrajectoryAction(
             node, f"{CONTROLLER}/follow_joint_trajectory", self._mover, self._outputs, self._warn

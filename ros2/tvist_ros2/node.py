@@ -16,6 +16,9 @@ class Node(ABC):
     A name that does not begin with / is in the node's namespace.
     """
 
+    warn: Callable[[str], None]
+    """Tells people which messages cannot be read; whoever uses the node sets it."""
+
     @abstractmethod
     def publisher(self, name: str, of: RosType, qos: Qos = DEFAULT) -> Callable[[Any], None]:
         """Announce a topic; return the function that publishes a message on it."""

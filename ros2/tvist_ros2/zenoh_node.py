@@ -1,7 +1,6 @@
 """A ROS 2 node over Zenoh, which speaks the protocol of rmw_zenoh without an installed ROS 2."""
 
 import asyncio
-import logging
 import time
 from collections.abc import Callable
 from functools import partial
@@ -22,8 +21,6 @@ from tvist_ros2.messages import RosType
 from tvist_ros2.names import DEFAULT, Kind, Qos, Tokens, absolute, key
 from tvist_ros2.node import Answer, Node
 from tvist_ros2.tasks import Tasks
-
-log = logging.getLogger(__name__)
 
 ATTACHMENT = Struct("<qqB16s")
 """Attachment of a message: its number, the time [ns], the length of the publisher's identifier, the identifier."""
@@ -87,11 +84,9 @@ class ZenohNode(Node):
 
         def receive(data: bytes) -> None:
             try:
-                message = decode(of.request, data)
+                callback(decode(of.request, data))
             except CdrError as error:
-                log.warning("an invalid message on %s: %s", name, error)
-            else:
-                callback(message)
+                self.warn(f"an invalid message on {name}: {error}")
 
         def on_sample(sample: zenoh.Sample) -> None:
             # Others may put on a key with a wildcard, which arrives here too.
@@ -107,17 +102,19 @@ class ZenohNode(Node):
         async def respond(query: zenoh.Query) -> None:
             with query:
                 try:
-                    # The reply repeats the client's number and identifier.
-                    number, _, _, identifier = ATTACHMENT.unpack(bytes(query.attachment or b""))
+                    number, identifier = _attached(query)
                     request = decode(of.request, bytes(query.payload or b""))
-                except ValueError as error:
-                    log.warning("an invalid request to %s: %s", name, error)
+                except CdrError as error:
+                    self.warn(f"an invalid request to {name}: {error}")
+                    query.reply_err(str(error))
                     return
                 response = encode(await answer(request))
                 query.reply(where, response, attachment=_attachment(number, identifier))
 
         def on_query(query: zenoh.Query) -> None:
-            wake(self._loop, lambda: self._answering.start(respond(query)))
+            # A key with a wildcard would call several services at once.
+            if str(query.key_expr) == where:
+                wake(self._loop, lambda: self._answering.start(respond(query)))
 
         self._kept.append(
             self._session.declare_queryable(where, Callback(on_query, indirect=False), complete=True)
@@ -144,6 +141,15 @@ def _seen_from_outside(endpoint: str, token: str) -> bool:
         return any(other.liveliness().get(token))
     finally:
         close_session(other)
+
+
+def _attached(query: zenoh.Query) -> tuple[int, bytes]:
+    """Return the client's number and identifier, which the reply repeats, or raise CdrError."""
+    data = bytes(query.attachment or b"")
+    if len(data) != ATTACHMENT.size:
+        raise CdrError(f"the attachment has {len(data)} bytes: must have {ATTACHMENT.size}")
+    number, _, _, identifier = ATTACHMENT.unpack(data)
+    return number, identifier
 
 
 def _attachment(number: int, identifier: bytes) -> bytes:

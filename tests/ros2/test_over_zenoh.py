@@ -15,7 +15,9 @@ from zenoh.handlers import Callback
 from tvist_client.errors import NotConnectedError
 from tvist_client.transports.inbox import wake
 from tvist_client.transports.session import close_session, open_session
+from tvist_protocol.modes import RobotMode
 from tvist_ros2.cdr import decode, encode
+from tvist_ros2.gateway import POSITIONS
 from tvist_ros2.messages import TYPES, ros
 from tvist_ros2.names import key
 from tvist_ros2.zenoh_node import ATTACHMENT, ZenohNode
@@ -32,6 +34,7 @@ SEND_GOAL, GET_RESULT, TRIGGER = (
     )
 )
 IDENTIFIER = bytes(range(16))
+ATTACHED = ATTACHMENT.pack(7, 0, 16, IDENTIFIER)
 
 
 class Peer:
@@ -57,20 +60,23 @@ class Peer:
         )
         return queue
 
+    async def replies(self, where, payload, attachment=ATTACHED):
+        """Call all services of a key; return their replies."""
+        replies, ended = [], asyncio.Event()
+        callback = Callback(replies.append, partial(wake, self.loop, ended.set), indirect=False)
+        self.session.get(where, callback, payload=payload, attachment=attachment, timeout=60)
+        await ended.wait()
+        return replies
+
     async def call(self, name, of, request):
         """Call a service."""
-        answer = self.loop.create_future()
-
-        def on_reply(reply):
-            wake(self.loop, partial(answer.set_result, (bytes(reply.ok.payload), bytes(reply.ok.attachment))))
-
-        attachment = ATTACHMENT.pack(7, 0, 16, IDENTIFIER)
-        where, callback = key(0, name, of), Callback(on_reply, indirect=False)
-        self.session.get(where, callback, payload=encode(request), attachment=attachment, timeout=60)
-        payload, told = await answer
-        number, _, size, identifier = ATTACHMENT.unpack(told)
+        replies = []
+        while not replies:  # this session may not have learned of the service yet
+            replies = await self.replies(key(0, name, of), encode(request))
+        (reply,) = replies
+        number, _, size, identifier = ATTACHMENT.unpack(bytes(reply.ok.attachment))
         assert (number, size, identifier) == (7, 16, IDENTIFIER)
-        return decode(of.response, payload)
+        return decode(of.response, bytes(reply.ok.payload))
 
     def tokens(self):
         replies = self.session.liveliness().get("@ros2_lv/**", timeout=5)
@@ -139,6 +145,37 @@ async def test_router_that_drops_messages_of_ros_2_is_named():
             await ZenohNode.open(endpoint, 0, "", "tvist_ur5e")
     finally:
         network.close()
+
+
+async def test_messages_that_cannot_be_read_are_reported_and_services_answer_with_an_error():
+    async with over_zenoh() as (robot, peer):
+        await robot.step(10)
+        told = peer.topic("/rosout", TYPES["rcl_interfaces/msg/Log"])
+        positions = key(0, f"/{POSITIONS}", TYPES["std_msgs/msg/Float64MultiArray"])
+        stop, request = key(0, "/dashboard_client/stop", TRIGGER), encode(ros.Trigger_Request())
+        for data, why in (
+            (b"\x00\x00" + encode(ros.Float64MultiArray())[2:], "begins with '0000': must begin with 0001"),
+            (encode(ros.Float64MultiArray(data=robot.q))[:-1], "cannot be decoded"),
+        ):
+            peer.session.put(positions, data)
+            assert why in (await told.get())[0].msg
+        for payload, attachment, why in (
+            (request, None, "the attachment has 0 bytes: must have 33"),
+            (request, b"abc", "the attachment has 3 bytes: must have 33"),
+            (b"", ATTACHED, "begins with ''"),
+        ):
+            (reply,) = await peer.replies(stop, payload, attachment)
+            assert why in bytes(reply.err.payload).decode()
+            assert why in (await told.get())[0].msg
+        assert (await peer.call("/dashboard_client/stop", TRIGGER, ros.Trigger_Request())).success
+
+
+async def test_key_with_a_wildcard_calls_no_service():
+    async with over_zenoh() as (robot, peer):
+        await robot.step(10)
+        every = key(0, "/dashboard_client/*", TRIGGER)
+        assert await peer.replies(every, encode(ros.Trigger_Request())) == []
+        assert robot.host.controller.report.state.robot_mode == RobotMode.RUNNING
 
 
 async def test_states_and_time_are_repeated_while_time_stands_still(monkeypatch):
