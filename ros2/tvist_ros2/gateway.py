@@ -8,6 +8,7 @@ from typing import Any
 from tvist_client.arm import Arm
 from tvist_client.robot import Robot
 from tvist_protocol import Info, TvistError
+from tvist_protocol.errors import one_line
 from tvist_ros2.action import TrajectoryAction
 from tvist_ros2.messages import TYPES, ros
 from tvist_ros2.mover import Mover
@@ -22,7 +23,10 @@ REPEAT_S = 1.0  # time without a state after which the last one is published aga
 WARN = 30  # a level of rcl_interfaces/msg/Log
 SAME_S = 5.0  # time within which the same warning is given only once [s]
 
-DASHBOARD: dict[str, Callable[[Arm], Awaitable[None]]] = {
+Command = Callable[[Arm], Awaitable[None]]
+
+DASHBOARD: dict[str, Command | None] = {
+    "stop": None,
     "power_on": lambda arm: arm.power_on(release_brakes=False),
     "brake_release": lambda arm: arm.power_on(),
     "power_off": lambda arm: arm.power_off(),
@@ -32,7 +36,7 @@ DASHBOARD: dict[str, Callable[[Arm], Awaitable[None]]] = {
     "pause": lambda arm: arm.pause_program(),
     "close_popup": lambda arm: arm.close_popup(),
 }
-"""Services that need control, as UR's driver names them in `dashboard_client`; `stop` needs none."""
+"""Services as UR's driver names them in `dashboard_client`, and their commands; `stop` needs no control."""
 
 
 class Gateway:
@@ -58,12 +62,14 @@ class Gateway:
         self._action = TrajectoryAction(
             node, f"{CONTROLLER}/follow_joint_trajectory", self._mover, self._outputs, self._warn
         )
-        node.subscribe(POSITIONS, TYPES["std_msgs/msg/Float64MultiArray"], self._position)
+        positions = TYPES["std_msgs/msg/Float64MultiArray"]
+        node.subscribe(
+            POSITIONS, positions, lambda message: self._mover.follow(message.data, self._outputs.tick)
+        )
         node.subscribe(
             f"{CONTROLLER}/joint_trajectory", TYPES["trajectory_msgs/msg/JointTrajectory"], self._trajectory
         )
         trigger = TYPES["std_srvs/srv/Trigger"]
-        node.serve("dashboard_client/stop", trigger, lambda _: self._done(robot.stop()))
         for service, command in DASHBOARD.items():
             node.serve(f"dashboard_client/{service}", trigger, partial(self._command, command))
 
@@ -90,37 +96,26 @@ class Gateway:
             if self._outputs.latest is before:
                 self._outputs.publish()
 
-    def _position(self, message: Any) -> None:
-        given, joints = len(message.data), len(self._outputs.joints)
-        if given == joints:
-            self._mover.follow(message.data, self._outputs.tick)
-        else:
-            self._warn(f"a position command has {given} numbers: must have {joints}")
-
     def _trajectory(self, message: Any) -> None:
         self._tasks.start(self._action.start(ros.FollowJointTrajectory_Goal(message)))
 
-    async def _command(self, command: Callable[[Arm], Awaitable[None]], _: Any) -> Any:
-        async def controlled() -> None:
-            async with self._mover.control() as arm:
-                await command(arm)
-
-        return await self._done(controlled())
-
-    async def _done(self, doing: Awaitable[None]) -> Any:
-        """Return the answer of a service: whether it was done, or why not."""
+    async def _command(self, command: Command | None, _: Any) -> Any:
+        """Carry out a service; the answer says whether it was done, or why not."""
         try:
-            await doing
+            if command is None:
+                await self._robot.stop()
+            else:
+                async with self._mover.control() as arm:
+                    await command(arm)
         except TvistError as error:
             return ros.Trigger_Response(False, str(error))
         return ros.Trigger_Response(True, "")
 
     def _warn(self, why: str) -> None:
         """Tell people and `/rosout` what was refused; the same thing only once in some seconds."""
-        now = asyncio.get_running_loop().time()
+        now, why = asyncio.get_running_loop().time(), one_line(why)
         self._warned = {said: when for said, when in self._warned.items() if now < when + SAME_S}
-        if why in self._warned:
-            return
-        self._warned[why] = now
-        self._say(why)
-        self._log(ros.Log(self._outputs.now(), WARN, self._name, why))
+        if why not in self._warned:
+            self._warned[why] = now
+            self._say(why)
+            self._log(ros.Log(self._outputs.now(), WARN, self._name, why))

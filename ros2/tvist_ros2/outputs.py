@@ -36,9 +36,8 @@ class Outputs:
             "force_torque_sensor_broadcaster/wrench", TYPES["geometry_msgs/msg/WrenchStamped"]
         )
         if (description := urdf(info)) is not None:
-            node.publisher("robot_description", TYPES["std_msgs/msg/String"], LATCHED)(
-                ros.String(description)
-            )
+            describe = node.publisher("robot_description", TYPES["std_msgs/msg/String"], LATCHED)
+            describe(ros.String(description))
 
     def now(self) -> Any:
         """Return ROS time: that of the wall clock in real time, otherwise that of the latest state."""
@@ -78,15 +77,8 @@ class Outputs:
         )
         pose = ros.Pose(ros.Point(*state.actual_TCP_pose[:3]), _quaternion(state.actual_TCP_pose[3:]))
         self._pose(ros.PoseStamped(at_base, pose))
-        self._imu(
-            ros.Imu(
-                at_flange,
-                orientation=ros.Quaternion(w=1.0),
-                orientation_covariance=_UNKNOWN,
-                angular_velocity_covariance=_UNKNOWN,
-                linear_acceleration=ros.Vector3(*state.actual_tool_accelerometer),
-            )
-        )
+        felt = ros.Vector3(*state.actual_tool_accelerometer)
+        self._imu(ros.Imu(at_flange, ros.Quaternion(w=1.0), _UNKNOWN, ros.Vector3(), _UNKNOWN, felt))
         if state.flange_wrench is not None:
             force, torque = ros.Vector3(*state.flange_wrench[:3]), ros.Vector3(*state.flange_wrench[3:])
             self._wrench(ros.WrenchStamped(at_flange, ros.Wrench(force, torque)))

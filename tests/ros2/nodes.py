@@ -88,6 +88,16 @@ class SteppedRobot:
         """The shaped reference."""
         return list(self.host.controller.report.state.target_q)
 
+    @property
+    def now(self):
+        """ROS time."""
+        return ros.Time(*divmod(round(1e9 * self.host.controller.report.state.timestamp), 10**9))
+
+    @property
+    def said(self):
+        """What was refused, and why."""
+        return [message.msg for message in self.node.published["/rosout"]]
+
     async def send_goal(self, points, names=JOINTS, **more):
         """Send a goal with points (time, q, qd); return its identifier and whether it was accepted."""
         self._goals += 1
@@ -102,9 +112,9 @@ class SteppedRobot:
         request = ros.FollowJointTrajectory_GetResult_Request(uuid)
         return self.node.ask(f"{ACTION}/get_result", request)
 
-    async def cancel(self, uuid):
-        """Cancel a goal."""
-        request = ros.CancelGoal_Request(ros.GoalInfo(uuid))
+    async def cancel(self, uuid, until=ros.Time()):  # noqa: B008  it cannot change
+        """Cancel the goals of an identifier and a time."""
+        request = ros.CancelGoal_Request(ros.GoalInfo(uuid, until))
         return await self.until(self.node.ask(f"{ACTION}/cancel_goal", request))
 
     def move(self, points, **more):
