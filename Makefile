@@ -82,13 +82,17 @@ soak: CASES = 2000
 soak: nightly search
 
 # The clients of other projects, and what docs/reference/ur-clients.md says of them. SOURCES and BUILD of UR's C++ library: see
-# tests/acceptance/urcl.py, which needs root.
+# tests/acceptance/urcl.py, which needs root. ROS2: a Python with rclpy, as tests/acceptance/ros2.sh makes it.
 URCL ?=
+ROS2 ?=
 acceptance: setup
 	$(BIN)/pytest tests/acceptance/clients.py
 ifneq ($(URCL),)
 	$(PYTHON) tests/acceptance/urcl.py $(URCL) --tvist $(BIN)/tvist
 	$(PYTHON) tests/acceptance/urcl.py $(URCL) --tvist $(BIN)/tvist --examples
+endif
+ifneq ($(ROS2),)
+	$(ROS2) -m pytest tests/acceptance/ros2.py
 endif
 
 format: setup
