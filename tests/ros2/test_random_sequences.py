@@ -87,7 +87,7 @@ async def test_random_sequence_leaves_the_robot_at_rest_and_free(seed):
         before = asyncio.all_tasks()
         chaos = Chaos(robot, other, rng)
         kinds = [chaos.follow, chaos.follow, chaos.follow, chaos.move, chaos.goal, chaos.goal, chaos.cancel]
-        for _ in range(40):
+        for _ in range(30):
             if rng.random() < 0.15:
                 await chaos.disturb()
             else:
