@@ -42,30 +42,38 @@ class Goal:
         self.on_path = Tolerances(wanted.path_tolerance, outputs.joints)
         self.at_end = Tolerances(wanted.goal_tolerance, outputs.joints)
         self.patience = seconds(wanted.goal_time_tolerance) or math.inf  # as ROS 2's controller reads 0
-        self.points = outputs.points_of(wanted.trajectory)
-        self.times = [point.time for point in self.points]
         self.info = info  # identifier and time; None for a trajectory of the topic
         self.status = EXECUTING
         self.result: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
+        self._trajectory = wanted.trajectory
+        self.read(outputs)
+
+    def read(self, outputs: Outputs) -> None:
+        """Compute the points for a start now."""
+        self.points = outputs.points_of(self._trajectory)
+        self.times = [point.time for point in self.points]
+
+    def moves(self, state: State) -> bool:
+        """Return whether the motion is not done yet at the tick of a state."""
+        return self.motion.done is None or state.tick < self.motion.done
 
     def take(self, state: State) -> Ending | None:
         """Take the state of a tick; return what the goal ends with, if it ends now."""
-        motion = self.motion
+        motion, stopped = self.motion, self.motion.stopped
         if motion.started is not None and state.runtime_state == RuntimeState.PLAYING:
             self.time += state.speed_scaling * TICK
-        if motion.done is not None:
-            return self.ending or self._judge(state, motion.done)
-        if not motion.ended or state.runtime_state != RuntimeState.STOPPED:
+        if not self.moves(state):
+            return self.ending or self._judge(state)
+        if stopped is None or state.tick < stopped.tick or state.runtime_state != RuntimeState.STOPPED:
             return None
-        why = "the connection was lost" if motion.stopped is None else motion.stopped.why
-        return self.ending or (ABORTED, INVALID_GOAL, f"the motion was stopped: {why}")
+        return self.ending or (ABORTED, INVALID_GOAL, f"the motion was stopped: {stopped.why}")
 
-    def _judge(self, state: State, done: int) -> Ending | None:
+    def _judge(self, state: State) -> Ending | None:
         """Return what the goal ends with after its motion; None while the arm may still reach its tolerances."""
         deviation = self.at_end.violation(state)
         if deviation is None:
             return SUCCEEDED, SUCCESSFUL, ""
-        if (state.tick - done) * TICK >= self.patience:
+        if (state.tick - (self.motion.done or 0)) * TICK >= self.patience:
             return ABORTED, GOAL_TOLERANCE_VIOLATED, deviation
         return None
 
@@ -98,8 +106,9 @@ class TrajectoryAction:
                 if self._active is not None:
                     self._stop(self._active, (ABORTED, INVALID_GOAL, "a newer trajectory replaced it"))
                     await asyncio.shield(self._active.result)
+                    goal.read(self._outputs)
                 if self._newest is not goal:
-                    raise MisuseError("a newer one replaced it")
+                    raise MisuseError("it was stopped, or a newer one replaced it")
                 goal.motion = await self._mover.begin(goal.points)
                 self._active = goal
         except TvistError as error:
@@ -117,8 +126,12 @@ class TrajectoryAction:
             self._give_feedback(goal, state)
         if ending is not None:
             self._end(goal, ending)
-        elif not goal.motion.ended and (deviation := goal.on_path.violation(state)) is not None:
+        elif goal.moves(state) and (deviation := goal.on_path.violation(state)) is not None:
             self._stop(goal, (ABORTED, PATH_TOLERANCE_VIOLATED, deviation))
+
+    def drop_waiting(self) -> None:
+        """Reject the trajectory that waits for the one before to rest."""
+        self._newest = None
 
     def close(self) -> None:
         """End the active goal, because the gateway ends."""
@@ -153,6 +166,8 @@ class TrajectoryAction:
 
     async def _cancel_goal(self, request: Any) -> Any:
         wanted, goal = request.goal_info, self._active
+        if not any(wanted.goal_id.uuid):
+            self.drop_waiting()
         if goal is not None and goal.info is not None and _concerns(wanted, goal.info):
             self._stop(goal, (CANCELED, SUCCESSFUL, ""))
             goal.status = CANCELING

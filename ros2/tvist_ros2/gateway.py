@@ -1,6 +1,7 @@
 """A robot as a ROS 2 robot: connects the robot's states and commands with a node."""
 
 import asyncio
+import re
 from collections.abc import Awaitable, Callable
 from functools import partial
 from typing import Any
@@ -21,22 +22,21 @@ CONTROLLER = "scaled_joint_trajectory_controller"  # as in UR's driver
 POSITIONS = "forward_position_controller/commands"
 REPEAT_S = 1.0  # time without a state after which the last one is published again [s]
 WARN = 30  # a level of rcl_interfaces/msg/Log
-SAME_S = 5.0  # time within which the same warning is given only once [s]
+SAME_S = 1.0  # time within which the same warning, perhaps with other numbers, is given only once [s]
 
 Command = Callable[[Arm], Awaitable[None]]
+Work = Callable[[], Awaitable[None]]
 
-DASHBOARD: dict[str, Command | None] = {
-    "stop": None,
+DASHBOARD: dict[str, Command] = {
     "power_on": lambda arm: arm.power_on(release_brakes=False),
     "brake_release": lambda arm: arm.power_on(),
     "power_off": lambda arm: arm.power_off(),
     "unlock_protective_stop": lambda arm: arm.unlock_protective_stop(),
     "restart_safety": lambda arm: arm.restart_safety(),
-    "play": lambda arm: arm.play_program(),
     "pause": lambda arm: arm.pause_program(),
     "close_popup": lambda arm: arm.close_popup(),
 }
-"""Services as UR's driver names them in `dashboard_client`, and their commands; `stop` needs no control."""
+"""Services that need control for a moment, as UR's driver names them in `dashboard_client`."""
 
 
 class Gateway:
@@ -70,8 +70,10 @@ class Gateway:
             f"{CONTROLLER}/joint_trajectory", TYPES["trajectory_msgs/msg/JointTrajectory"], self._trajectory
         )
         trigger = TYPES["std_srvs/srv/Trigger"]
-        for service, command in DASHBOARD.items():
-            node.serve(f"dashboard_client/{service}", trigger, partial(self._command, command))
+        works: dict[str, Work] = {"stop": self._stop, "play": self._mover.play}
+        works |= {service: partial(self._controlled, command) for service, command in DASHBOARD.items()}
+        for service, work in works.items():
+            node.serve(f"dashboard_client/{service}", trigger, partial(self._answer, work))
 
     async def run(self) -> None:
         """Work until the robot disconnects, which raises NotConnectedError."""
@@ -99,14 +101,19 @@ class Gateway:
     def _trajectory(self, message: Any) -> None:
         self._tasks.start(self._action.start(ros.FollowJointTrajectory_Goal(message)))
 
-    async def _command(self, command: Command | None, _: Any) -> Any:
+    async def _controlled(self, command: Command) -> None:
+        async with self._mover.control() as arm:
+            await command(arm)
+
+    async def _stop(self) -> None:
+        self._action.drop_waiting()
+        self._mover.ignore_positions()
+        await self._robot.stop()
+
+    async def _answer(self, work: Work, _: Any) -> Any:
         """Carry out a service; the answer says whether it was done, or why not."""
         try:
-            if command is None:
-                await self._robot.stop()
-            else:
-                async with self._mover.control() as arm:
-                    await command(arm)
+            await work()
         except TvistError as error:
             return ros.Trigger_Response(False, str(error))
         return ros.Trigger_Response(True, "")
@@ -115,7 +122,8 @@ class Gateway:
         """Tell people and `/rosout` what was refused; the same thing only once in some seconds."""
         now, why = asyncio.get_running_loop().time(), one_line(why)
         self._warned = {said: when for said, when in self._warned.items() if now < when + SAME_S}
-        if why not in self._warned:
-            self._warned[why] = now
+        cause = re.sub(r"[-+.\d]+", "", why)
+        if cause not in self._warned:
+            self._warned[cause] = now
             self._say(why)
             self._log(ros.Log(self._outputs.now(), WARN, self._name, why))

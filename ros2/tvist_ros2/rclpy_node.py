@@ -4,6 +4,7 @@ import asyncio
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future
+from functools import partial
 from importlib import import_module
 from typing import Any
 
@@ -11,7 +12,7 @@ from msgspec import Struct
 
 from tvist_client.errors import MisuseError
 from tvist_client.transports.inbox import wake
-from tvist_ros2.cdr import decode, encode
+from tvist_ros2.cdr import CdrError, decode, encode
 from tvist_ros2.messages import RosType
 from tvist_ros2.names import DEFAULT, Qos, absolute
 from tvist_ros2.node import Answer, Node
@@ -55,17 +56,27 @@ class RclpyNode(Node):
         return lambda message: publisher.publish(encode(message))
 
     def subscribe(self, name: str, of: RosType, callback: Callable[[Any], None]) -> None:
-        def receive(data: bytes) -> None:
-            wake(self._loop, lambda: callback(decode(of.request, data)))
+        def read(data: bytes) -> None:
+            try:
+                callback(decode(of.request, data))
+            except CdrError as error:
+                self.warn(f"an invalid message on {name}: {error}")
 
-        name = absolute(self._namespace, name)
-        self._node.create_subscription(_class(of), name, receive, DEFAULT.depth, raw=True)
+        def receive(data: bytes) -> None:
+            wake(self._loop, lambda: read(data))
+
+        topic = absolute(self._namespace, name)
+        self._node.create_subscription(_class(of), topic, receive, DEFAULT.depth, raw=True)
 
     def serve(self, name: str, of: RosType, answer: Answer) -> None:
         serialization = self._rclpy.serialization
 
         async def respond(request: Any, response: Any) -> Any:
-            asked = decode(of.request, serialization.serialize_message(request))
+            try:
+                asked = decode(of.request, serialization.serialize_message(request))
+            except CdrError as error:
+                wake(self._loop, partial(self.warn, f"an invalid request to {name}: {error}"))
+                return response  # its default says no
             done = self._rclpy.task.Future(executor=self._executor)
 
             def finish(running: Future[Any]) -> None:
@@ -76,8 +87,8 @@ class RclpyNode(Node):
             asyncio.run_coroutine_threadsafe(answer(asked), self._loop).add_done_callback(finish)
             return serialization.deserialize_message(encode(await done), type(response))
 
-        name = absolute(self._namespace, name)
-        self._node.create_service(_class(of), name, respond, callback_group=self._group)
+        service = absolute(self._namespace, name)
+        self._node.create_service(_class(of), service, respond, callback_group=self._group)
 
     async def close(self) -> None:
         await asyncio.to_thread(self._end)

@@ -1,6 +1,7 @@
 """A ROS 2 node over Zenoh, which speaks the protocol of rmw_zenoh without an installed ROS 2."""
 
 import asyncio
+import threading
 import time
 from collections.abc import Callable
 from functools import partial
@@ -24,6 +25,7 @@ from tvist_ros2.tasks import Tasks
 
 ATTACHMENT = Struct("<qqB16s")
 """Attachment of a message: its number, the time [ns], the length of the publisher's identifier, the identifier."""
+SEEN_S = 5.0  # longest time until others at the router see a node [s]
 
 
 class ZenohNode(Node):
@@ -136,9 +138,11 @@ class ZenohNode(Node):
 
 def _seen_from_outside(endpoint: str, token: str) -> bool:
     """Return whether another session at the router sees a node's token."""
-    other = open_session(endpoint)
+    other, seen = open_session(endpoint), threading.Event()
     try:
-        return any(other.liveliness().get(token))
+        watch: Callback[zenoh.Sample] = Callback(lambda _: seen.set(), indirect=False)
+        _watching = other.liveliness().declare_subscriber(token, watch, history=True)
+        return seen.wait(SEEN_S)
     finally:
         close_session(other)
 

@@ -62,7 +62,7 @@ class SteppedRobot:
 
     def __init__(self, host, other, stepper, node):
         self.host, self.other, self.node = host, other, node
-        self._stepper, self._goals = stepper, 0
+        self.stepper, self._goals = stepper, 0
 
     async def settle(self):
         """Let everybody react without time passing."""
@@ -71,7 +71,7 @@ class SteppedRobot:
 
     async def step(self, ticks):
         for first in range(0, ticks, AT_ONCE):
-            await self._stepper.step(min(AT_ONCE, ticks - first))
+            await self.stepper.step(min(AT_ONCE, ticks - first))
             await self.settle()
 
     async def until(self, task, ticks=5000):

@@ -303,6 +303,61 @@ async def test_stopped_position_commands_are_followed_again_once_they_have_pause
         assert robot.q == pytest.approx(steps(stopped, 1, 2)[0], abs=1e-6)
 
 
+async def test_a_stop_between_position_commands_counts_too():
+    async with stepped_robot(**QUIET) as robot:
+        await robot.step(10)
+        q = robot.q
+        await stream(robot, steps(q, 1, 2))
+        await robot.step(200)
+        assert (await robot.trigger("stop")).success
+        stopped = robot.q
+        await stream(robot, steps(q, 20, 40))
+        assert robot.q == stopped
+
+
+async def test_stop_also_drops_a_trajectory_that_waits():
+    async with stepped_robot(**QUIET) as robot:
+        await robot.step(10)
+        await robot.send_goal(there_and_back(robot.q))
+        await robot.step(100)
+        robot.move(there_and_back(robot.q))
+        await robot.settle()
+        assert (await robot.trigger("stop")).success
+        await robot.step(100)
+        stopped = robot.q
+        await robot.step(500)
+        assert robot.q == stopped
+        assert "it was stopped" in robot.said[-1]
+
+
+async def test_tolerance_is_judged_at_its_tick_even_if_states_come_late():
+    async with stepped_robot(**QUIET) as robot:
+        await robot.step(10)
+        uuid, _ = await robot.send_goal(there_and_back(robot.q), path_tolerance=TIGHT)
+        await robot.stepper.step(2000)
+        ended = await robot.until(robot.result(uuid))
+        assert (ended.status, ended.result.error_code) == (ABORTED, PATH_TOLERANCE_VIOLATED)
+
+
+async def test_program_plays_to_its_end_and_can_be_paused():
+    async with stepped_robot(**QUIET) as robot:
+        await robot.step(10)
+        q = robot.q
+        async with robot.other.control("other") as arm:
+            await arm.load_program("turn", f"movej([{q[0] + 0.2}, {', '.join(map(str, q[1:]))}])")
+        assert (await robot.trigger("play")).success
+        await robot.step(100)
+        assert (await robot.trigger("pause")).success
+        await robot.step(200)
+        paused = robot.q
+        await robot.step(200)
+        assert robot.q == paused
+        assert (await robot.trigger("play")).success
+        await robot.step(1000)
+        assert robot.q[0] == pytest.approx(q[0] + 0.2, abs=1e-6)
+        assert robot.host.controller.session.lease is None
+
+
 async def test_position_command_during_a_trajectory_is_refused():
     async with stepped_robot(**QUIET) as robot:
         await robot.step(10)

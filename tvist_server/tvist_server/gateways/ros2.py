@@ -4,6 +4,7 @@ import asyncio
 import sys
 from asyncio.subprocess import DEVNULL
 from collections.abc import Callable
+from contextlib import suppress
 
 from tvist_server.gateways.base import Gateway
 
@@ -23,13 +24,20 @@ class Ros2Gateway(Gateway):
         self._running = asyncio.create_task(self._run())
 
     async def _run(self) -> None:
-        # In a session of its own, so that the terminal's Control+C reaches the server alone.
-        process = await asyncio.create_subprocess_exec(*self._command, stdin=DEVNULL, start_new_session=True)
+        try:
+            # In a session of its own, so that the terminal's Control+C reaches the server alone.
+            process = await asyncio.create_subprocess_exec(
+                *self._command, stdin=DEVNULL, start_new_session=True
+            )
+        except OSError as error:
+            self._warn(f"ROS 2 does not see the robot: tvist ros2 did not start: {error}")
+            return
         try:
             code = await process.wait()
             self._warn(f"ROS 2 does not see the robot any longer: tvist ros2 has ended with exit code {code}")
         except asyncio.CancelledError:
-            process.kill()  # it keeps nothing
+            with suppress(ProcessLookupError):
+                process.kill()  # it keeps nothing
             await process.wait()
 
     async def shut(self) -> None:
