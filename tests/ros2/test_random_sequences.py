@@ -87,13 +87,13 @@ async def test_random_sequence_leaves_the_robot_at_rest_and_free(seed):
         before = asyncio.all_tasks()
         chaos = Chaos(robot, other, rng)
         kinds = [chaos.follow, chaos.follow, chaos.follow, chaos.move, chaos.goal, chaos.goal, chaos.cancel]
-        for _ in range(30):
+        for _ in range(24):
             if rng.random() < 0.15:
                 await chaos.disturb()
             else:
                 rng.choice([*kinds, chaos.serve])()
             await robot.step(rng.choice([0, 0, 1, 20, 100, 300]))
-        await robot.step(1500)
+        await robot.step(1000)
         assert robot.host.controller.session.lease is None
         for task in chaos.asked:
             assert task.done()
