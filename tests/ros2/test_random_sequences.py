@@ -64,7 +64,7 @@ class Chaos:
             await self.rng.choice(
                 [
                     self.other.stop,
-                    lambda: self.other.request(SetSpeed(token=token, fraction=self.rng.choice([0.3, 1.0]))),
+                    lambda: self.other.request(SetSpeed(token=token, fraction=self.rng.choice([0.5, 1.0]))),
                     lambda: self.other.request(SimulationInject(token=token, fault="protective_stop")),
                     self.jog,
                 ]
@@ -93,7 +93,7 @@ async def test_random_sequence_leaves_the_robot_at_rest_and_free(seed):
             else:
                 rng.choice([*kinds, chaos.serve])()
             await robot.step(rng.choice([0, 0, 1, 20, 100, 300]))
-        await robot.step(1000)
+        await robot.step(1500)
         assert robot.host.controller.session.lease is None
         for task in chaos.asked:
             assert task.done()
