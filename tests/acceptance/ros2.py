@@ -158,13 +158,10 @@ def test_cancelled_goal_stops_on_its_way(client):
     assert start[0] + 0.1 - NEAR < client.q()[0] < start[0] + 0.4
 
 
-def test_rejected_goal_has_a_reason(client):
+def test_impossible_goal_is_rejected(client):
     q = client.q()
-    goal = client.send_goal([q[0] + 0.5, *q[1:]], 0.05)
-    assert not goal.accepted
-    result = client.result(goal).result
-    assert result.error_code == FollowJointTrajectory.Result.INVALID_GOAL
-    assert "points[0]" in result.error_string
+    assert not client.send_goal([q[0] + 0.5, *q[1:]], 0.05).accepted
+    client.rest_at(q)
 
 
 def test_services_switch_power_and_say_why_they_cannot(client):

@@ -23,7 +23,7 @@ from tvist_cli.main import GROUPS, OF_GROUPS, _overview, application, examples
 EXAMPLES = examples()
 COMPARED = (DOCS / "how-to" / "change-a-shaper.md").read_text("utf-8")
 WAVE = ROOT / "clients" / "examples" / "wave.script"
-SERVED = ("check", "move", "watch", "log record", "stop", "unlock", "forget", "ros2", "view")
+SERVED = ("check", "move", "watch", "log record", "stop", "unlock", "forget", "view")
 """Commands whose examples need the robot of `serve`'s example."""
 SILENT = ("log report", "log export", "log record")  # commands without output
 SAVED = r"^Save this as `([\w.]+)`.*?^```\w+\n(.*?)^```$"
@@ -152,15 +152,12 @@ def test_example_works(command, place, request):
     words = shlex.split(EXAMPLES[command])[1:]
     if command in SERVED:
         endpoint = request.getfixturevalue("served").endpoint
-        words += (
-            [endpoint]
-            if command in ("check", "watch", "unlock", "ros2", "view")
-            else ["--endpoint", endpoint]
-        )
+        words += [endpoint] if command in ("check", "watch", "unlock", "view") else ["--endpoint", endpoint]
     if command == "view":
         until("http://", *words, "--port", "0", cwd=place)
     elif command == "ros2":
-        until("is in ROS 2", *words, cwd=place)
+        with Served("--ros2") as robot:
+            until("is in ROS 2", *words, robot.endpoint, cwd=place)
     elif command == "router":
         until("listens", *words, "--listen", free_endpoint(), cwd=place)
     else:
