@@ -9,8 +9,6 @@ folder=$1 sources=$2
 python3 -m venv "$folder"
 folder=$(realpath "$folder")
 export PATH="$folder/bin:$PATH"
-pip install --quiet --editable ./protocol --editable ./shaping --editable ./urscript --editable '.[testing]' \
-  hypothesis pytest-asyncio pytest-timeout
 pip install --quiet 'ros-rclpy[fastrtps]==9.1.2' ros-diagnostic-msgs ros-sensor-msgs ros-std-srvs ros-trajectory-msgs
 # What generates and compiles messages; these wheels do not name all that they need.
 pip install --quiet catkin_pkg cmake ninja ros-ament-cmake ros-ament-cmake-include-directories \
@@ -21,3 +19,6 @@ find "$folder/share" -name '*Export.cmake' -exec sed -i "s,/opt/python/[^\"]*,$h
 cmake -G Ninja -S "$sources/control_msgs" -B "$folder/control_msgs" -D BUILD_TESTING=OFF \
   -D CMAKE_PREFIX_PATH="$folder" -D CMAKE_INSTALL_PREFIX="$folder"
 cmake --build "$folder/control_msgs" --target install
+# Last, because the wheels of ROS 2 bring an old `lark`, and tvist needs a newer one.
+pip install --quiet --editable ./protocol --editable ./shaping --editable ./urscript --editable '.[testing]' \
+  hypothesis pytest-asyncio pytest-timeout
