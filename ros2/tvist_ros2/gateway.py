@@ -25,7 +25,7 @@ WARN = 30  # a level of rcl_interfaces/msg/Log
 SAME_S = 1.0  # time within which the same warning, perhaps with other numbers, is given only once [s]
 
 Command = Callable[[Arm], Awaitable[None]]
-Work = Callable[[], Awaitable[None]]
+Service = Callable[[], Awaitable[None]]
 
 DASHBOARD: dict[str, Command] = {
     "power_on": lambda arm: arm.power_on(release_brakes=False),
@@ -70,10 +70,10 @@ class Gateway:
             f"{CONTROLLER}/joint_trajectory", TYPES["trajectory_msgs/msg/JointTrajectory"], self._trajectory
         )
         trigger = TYPES["std_srvs/srv/Trigger"]
-        works: dict[str, Work] = {"stop": self._stop, "play": self._mover.play}
-        works |= {service: partial(self._controlled, command) for service, command in DASHBOARD.items()}
-        for service, work in works.items():
-            node.serve(f"dashboard_client/{service}", trigger, partial(self._answer, work))
+        services: dict[str, Service] = {"stop": self._stop, "play": self._mover.play}
+        services |= {its_name: partial(self._controlled, command) for its_name, command in DASHBOARD.items()}
+        for its_name, service in services.items():
+            node.serve(f"dashboard_client/{its_name}", trigger, partial(self._answer, service))
 
     async def run(self) -> None:
         """Work until the robot disconnects, which raises NotConnectedError."""
@@ -110,10 +110,10 @@ class Gateway:
         self._mover.ignore_positions()
         await self._robot.stop()
 
-    async def _answer(self, work: Work, _: Any) -> Any:
+    async def _answer(self, service: Service, _: Any) -> Any:
         """Carry out a service; the answer says whether it was done, or why not."""
         try:
-            await work()
+            await service()
         except TvistError as error:
             return ros.Trigger_Response(False, str(error))
         return ros.Trigger_Response(True, "")
