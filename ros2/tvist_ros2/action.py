@@ -51,29 +51,30 @@ class Goal:
     def read(self, outputs: Outputs) -> None:
         """Compute the points for a start now."""
         self.points = outputs.points_of(self._trajectory)
-        self.times = [point.time for point in self.points]
 
-    def moves(self, state: State) -> bool:
-        """Return whether the motion is not done yet at the tick of a state."""
-        return self.motion.done is None or state.tick < self.motion.done
+    def rested(self, state: State) -> int | None:
+        """Return the ticks from the end of the motion to a state; None if it is not done by then."""
+        done = self.motion.done
+        return None if done is None or state.tick < done else state.tick - done
 
     def take(self, state: State) -> Ending | None:
         """Take the state of a tick; return what the goal ends with, if it ends now."""
         motion, stopped = self.motion, self.motion.stopped
         if motion.started is not None and state.runtime_state == RuntimeState.PLAYING:
             self.time += state.speed_scaling * TICK
-        if not self.moves(state):
-            return self.ending or self._judge(state)
+        rested = self.rested(state)
+        if rested is not None:
+            return self.ending or self._judge(state, rested)
         if stopped is None or state.tick < stopped.tick or state.runtime_state != RuntimeState.STOPPED:
             return None
         return self.ending or (ABORTED, INVALID_GOAL, f"the motion was stopped: {stopped.why}")
 
-    def _judge(self, state: State) -> Ending | None:
+    def _judge(self, state: State, rested: int) -> Ending | None:
         """Return what the goal ends with after its motion; None while the arm may still reach its tolerances."""
         deviation = self.at_end.violation(state)
         if deviation is None:
             return SUCCEEDED, SUCCESSFUL, ""
-        if (state.tick - (self.motion.done or 0)) * TICK >= self.patience:
+        if rested * TICK >= self.patience:
             return ABORTED, GOAL_TOLERANCE_VIOLATED, deviation
         return None
 
@@ -126,7 +127,7 @@ class TrajectoryAction:
             self._give_feedback(goal, state)
         if ending is not None:
             self._end(goal, ending)
-        elif goal.moves(state) and (deviation := goal.on_path.violation(state)) is not None:
+        elif goal.rested(state) is None and (deviation := goal.on_path.violation(state)) is not None:
             self._stop(goal, (ABORTED, PATH_TOLERANCE_VIOLATED, deviation))
 
     def drop_waiting(self) -> None:
@@ -189,7 +190,7 @@ class TrajectoryAction:
         error = [[a - b for a, b in zip(*pair, strict=True)] for pair in zip(desired, actual, strict=True)]
         points = [ros.JointTrajectoryPoint(*one, time_from_start=time) for one in (desired, actual, error)]
         content = (ros.Header(self._outputs.now()), self._outputs.joints, *points)
-        index = min(bisect(goal.times, goal.time), len(goal.times) - 1)
+        index = min(bisect(goal.points, goal.time, key=lambda point: point.time), len(goal.points) - 1)
         identifier, newer = goal.info.goal_id, ros.FollowJointTrajectory_Feedback(*content, index=index)
         self._feedback(ros.FollowJointTrajectory_FeedbackMessage(identifier, newer))
         self._jazzy_feedback(ros.JazzyFeedbackMessage(identifier, ros.JazzyFeedback(*content)))

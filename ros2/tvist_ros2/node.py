@@ -4,6 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Coroutine
 from typing import Any
 
+from tvist_ros2.cdr import CdrError, decode
 from tvist_ros2.messages import RosType
 from tvist_ros2.names import DEFAULT, Qos
 
@@ -17,7 +18,7 @@ class Node(ABC):
     """
 
     warn: Callable[[str], None]
-    """Tells people which messages cannot be read; whoever uses the node sets it."""
+    """Called with the reason if a message cannot be read; set it before the first subscription."""
 
     @abstractmethod
     def publisher(self, name: str, of: RosType, qos: Qos = DEFAULT) -> Callable[[Any], None]:
@@ -30,6 +31,13 @@ class Node(ABC):
     @abstractmethod
     def serve(self, name: str, of: RosType, answer: Answer) -> None:
         """Answer a service with the result of a function of the request, which may take any time."""
+
+    def deliver(self, name: str, of: RosType, callback: Callable[[Any], None], data: bytes) -> None:
+        """Call a function with an encoded message of a topic, or warn if it cannot be read."""
+        try:
+            callback(decode(of.request, data))
+        except CdrError as error:
+            self.warn(f"an invalid message on {name}: {error}")
 
     @abstractmethod
     async def close(self) -> None:

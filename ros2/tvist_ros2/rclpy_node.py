@@ -56,14 +56,8 @@ class RclpyNode(Node):
         return lambda message: publisher.publish(encode(message))
 
     def subscribe(self, name: str, of: RosType, callback: Callable[[Any], None]) -> None:
-        def read(data: bytes) -> None:
-            try:
-                callback(decode(of.request, data))
-            except CdrError as error:
-                self.warn(f"an invalid message on {name}: {error}")
-
         def receive(data: bytes) -> None:
-            wake(self._loop, lambda: read(data))
+            wake(self._loop, partial(self.deliver, name, of, callback, data))
 
         topic = absolute(self._namespace, name)
         self._node.create_subscription(_class(of), topic, receive, DEFAULT.depth, raw=True)

@@ -84,16 +84,10 @@ class ZenohNode(Node):
     def subscribe(self, name: str, of: RosType, callback: Callable[[Any], None]) -> None:
         where = self._key(name, of)
 
-        def receive(data: bytes) -> None:
-            try:
-                callback(decode(of.request, data))
-            except CdrError as error:
-                self.warn(f"an invalid message on {name}: {error}")
-
         def on_sample(sample: zenoh.Sample) -> None:
             # Others may put on a key with a wildcard, which arrives here too.
             if str(sample.key_expr) == where:
-                wake(self._loop, partial(receive, sample.payload.to_bytes()))
+                wake(self._loop, partial(self.deliver, name, of, callback, sample.payload.to_bytes()))
 
         self._kept.append(self._session.declare_subscriber(where, Callback(on_sample, indirect=False)))
         self._announce("MS", name, of)

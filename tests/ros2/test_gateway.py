@@ -41,7 +41,7 @@ def there_and_back(q, time=1.0, joint=0, by=0.2):
 def flange_of(urdf, angles):
     """Return position and rotation of the last link in the first, along the joints of a URDF."""
     place, turn = np.zeros(3), Rotation.identity()
-    for joint in ET.fromstring(urdf).findall("joint"):  # noqa: S314  it is ours
+    for joint in urdf.findall("joint"):
         if (origin := joint.find("origin")) is not None:
             xyz, rpy = (np.array(origin.get(part).split(), dtype=float) for part in ("xyz", "rpy"))
             place, turn = place + turn.apply(xyz), turn * Rotation.from_euler("xyz", rpy)
@@ -68,10 +68,11 @@ async def test_states_come_every_tick_with_the_clock_and_the_description_once():
         assert np.linalg.norm([felt.x, felt.y, felt.z]) == pytest.approx(9.81, abs=0.5)
         (described,) = published["robot_description"]
         assert robot.node.qos["robot_description"].latched
-        place, turn = flange_of(described.data, dict(zip(JOINTS, state.actual_q, strict=True)))
+        urdf = ET.fromstring(described.data)  # noqa: S314  it is ours
+        place, turn = flange_of(urdf, dict(zip(JOINTS, state.actual_q, strict=True)))
         assert place == pytest.approx(state.actual_TCP_pose[:3], abs=1e-9)
         assert (turn.inv() * Rotation.from_rotvec(state.actual_TCP_pose[3:])).magnitude() < 1e-9
-        shapes = [shape.tag for shape in ET.fromstring(described.data).findall(".//collision/geometry/*")]  # noqa: S314  it is ours
+        shapes = [shape.tag for shape in urdf.findall(".//collision/geometry/*")]
         assert shapes == ["cylinder"] * 7
 
 
