@@ -37,7 +37,7 @@ def script_of(
     references = References(tree)
     parts, functions = _parts(tree, references), _functions(tree, references)
     main = next((part for part in parts if part.tag == "MainProgram"), None)
-    if main is None or main.find("./children/*") is None:
+    if main is None or not children_of(main):
         raise UserFileError("it has no program that can be read: save it in PolyScope as a script")
     numbers = {node: number for number, node in enumerate(chain.from_iterable(map(inside, parts)), 1)}
     given = installed(tree.get("installation") or "default")
@@ -89,7 +89,7 @@ def _initial(nodes: Nodes, variable: Element) -> None:
 
 def _parts(tree: Element, references: References) -> list[Element]:
     """Return the parts of a file in its order, as PolyScope numbers them: suppressed ones too."""
-    listed = tree.findall("./children/*")
+    listed = children_of(tree)
     shown = (one.find("suppressedNode") if one.tag == "SuppressedNode" else one for one in listed)
     return [part for part in dict.fromkeys(map(references.target, shown)) if part is not None]
 
