@@ -18,7 +18,7 @@ from tvist_client.transports.session import close_session, open_session
 from tvist_protocol.modes import RobotMode
 from tvist_ros2.cdr import decode, encode
 from tvist_ros2.gateway import POSITIONS
-from tvist_ros2.messages import TYPES, ros
+from tvist_ros2.messages import TYPES, ros, seconds
 from tvist_ros2.names import key
 from tvist_ros2.zenoh_node import ATTACHMENT, ZenohNode
 from tvist_server.gateways.access import open_access
@@ -100,7 +100,7 @@ async def over_zenoh():
 
 
 async def moved():
-    """Move the robot by the action; return all joint states as they came."""
+    """Move the robot by the action; return all joint states that a tick brought."""
     async with over_zenoh() as (robot, peer):
         states = peer.topic("/joint_states", TYPES["sensor_msgs/msg/JointState"])
         uuid, q = ros.UUID(b"goal" * 4), robot.q
@@ -112,12 +112,16 @@ async def moved():
         result = asyncio.create_task(peer.call(f"/{ACTION}/get_result", GET_RESULT, asked))
         await robot.step(400)
         assert (await result).result.error_code == 0
-        received = [await states.get() for _ in range(400)]
+        received = [await states.get()]
+        while received[-1][0].header.stamp != robot.now:
+            received.append(await states.get())
         numbers = [attached[0] for _, attached in received]
-        assert numbers == list(range(numbers[0], numbers[0] + 400))
+        assert numbers == list(range(numbers[0], numbers[0] + len(received)))
         assert len({attached[3] for _, attached in received}) == 1
         assert received[-1][0].name == JOINTS
-        return [encode(message) for message, _ in received[-400:]]
+        ticked = [encode(message) for message, _ in received if seconds(message.header.stamp) > 0]
+        assert len(ticked) == 400
+        return ticked
 
 
 async def test_two_nodes_move_the_robot_and_repeat_it_to_the_last_bit():
