@@ -55,6 +55,7 @@ def path(tmp_path):
 def network(monkeypatch):
     made = Listener()
     monkeypatch.setattr(republish, "Network", lambda *_, **__: made)
+    monkeypatch.setattr(republish, "LEAVE", 60.0)
     return made
 
 

@@ -99,6 +99,7 @@ async def test_robot_in_lockstep_is_only_watched(robot, said):
 
 
 async def test_stop_ends_a_jog_until_the_button_is_released(robot, pilot, monkeypatch):
+    monkeypatch.setattr(asyncio.get_running_loop(), "time", lambda: 1000.0)
     began = []
 
     async def play(_arm):

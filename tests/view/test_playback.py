@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.conformance.served import finished
+from tests.conformance.served import PATIENCE, finished
 
 from tvist_view.playback import playback, said
 from tvist_view.track import Track, TrackError
@@ -68,6 +68,7 @@ def test_page_in_a_file_plays_and_seeks_without_network(chromium, tracks, tmp_pa
     result = said({"less_percent": 94.0, "earlier_ms": 134.0, "before": 0.61, "after": 0.04}, "zv", "Q1 → Q2")
     file.write_text(playback(tracks, "both", factor=100.0, result=result), encoding="utf-8")
     page = chromium.new_page(viewport={"width": 260, "height": 320})
+    page.set_default_timeout(PATIENCE * 1000.0)
     asked = []
     page.on("request", lambda request: asked.append(request.url))
     page.goto(file.as_uri())
