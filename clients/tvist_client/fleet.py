@@ -19,14 +19,12 @@ from tvist_client.robot import ENDPOINT
 from tvist_client.transports.certificates import Folder
 from tvist_client.transports.inbox import wake
 from tvist_client.transports.session import ask, close_session, open_session
-from tvist_client.transports.zenoh import natural
+from tvist_client.transports.zenoh import for_each_robot, natural
 from tvist_protocol import Info, ProtocolError, Refused, State, Stop, Telemetry, keys
 from tvist_protocol.codec import decode, decode_reply, encode
 
 T = TypeVar("T")
 ANSWER_S = 3.0  # longest wait for a robot's answer [s]
-SETTLE_S = 0.3
-"""Time after opening a session in which tokens of robots arrive [s]; `look` also finds later ones."""
 LISTEN_S = 1.3  # time in which every robot in real time publishes its telemetry at least once [s]
 _TIMING = ("ticks_per_second", "missed_ticks", "late_p99_us", "load", "due_ticks", "overloaded")
 """Fields of `FleetRobot` that come from telemetry."""
@@ -144,7 +142,8 @@ class Fleet(FleetSession):
         )
         self._session.liveliness().declare_subscriber(alive, self._of_robots(self._on_token), history=True)
         self._session.declare_subscriber(telemetry, self._of_robots(self._on_telemetry))
-        await asyncio.sleep(SETTLE_S)
+        # When this query ends, the tokens of all robots have come; on a slow machine that takes a while.
+        await for_each_robot(self._session, alive, lambda *place: self.places.add(RobotPlace(*place)))
 
     async def listen(self) -> None:
         """Wait until every robot in real time has published its telemetry."""

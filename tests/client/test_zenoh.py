@@ -90,10 +90,12 @@ async def test_the_liveliness_token_exists_while_control_is_held(realtime, robot
 
 
 async def test_the_lease_is_renewed_until_control_is_lost(realtime, robot, note, caplog):
-    async with robot.control("me", lease_s=0.1):
+    async with robot.control("me", lease_s=0.9):
         for _ in range(3):
             await note(realtime, "keep_alive")
         realtime.post(realtime.robot.controller.session.release)
+        realtime.post(lambda: realtime.robot.notes.put("released"))
+        await note(realtime, "released")  # and what was noted before
         await note(realtime, "keep_alive")
         await robot.info()  # its answer comes after the refusal
     assert "control is lost" in caplog.text
@@ -117,8 +119,9 @@ async def test_all_states_of_a_lockstep_step_have_arrived_when_it_returns(lockst
     assert truths[:2499] == list(range(1, 2500))
 
 
-async def test_set_points_arrive_numbered_and_in_order(realtime, robot):
+async def test_set_points_arrive_numbered_and_in_order(realtime, robot, monkeypatch):
     """A network may drop some; what comes keeps its number and its place."""
+    monkeypatch.setattr("tvist_controller.motion.setpoints.TIMEOUT", 60.0)
     arrived, states = realtime.robot.setpoints, robot.states()
     async with robot.control("me") as arm, arm.servo(period=0.008) as servo:
         q = (await anext(states)).target_q

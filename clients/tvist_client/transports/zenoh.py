@@ -248,18 +248,23 @@ async def _opened(endpoint: str, security: Folder | None, namespace: str) -> zen
 
 async def _robots(session: zenoh.Session) -> list[str]:
     """Return the names of the reachable robots, in natural order: ur5e-2 before ur5e-10."""
-    loop, ended = asyncio.get_running_loop(), asyncio.Event()
     names = list[str]()
+    await for_each_robot(session, keys.ANY_ALIVE, lambda _, name: names.append(name))
+    return sorted(names, key=natural)
+
+
+async def for_each_robot(session: zenoh.Session, selector: str, take: Callable[[str, str], None]) -> None:
+    """Call a function with namespace and name of each robot whose liveliness token a key selects."""
+    loop, ended = asyncio.get_running_loop(), asyncio.Event()
 
     def on_reply(reply: zenoh.Reply) -> None:
         if reply.ok is not None and (place := keys.place(str(reply.ok.key_expr))) is not None:
-            names.append(place[1])
+            wake(loop, partial(take, *place))
 
     session.liveliness().get(
-        keys.ANY_ALIVE, Callback(on_reply, partial(wake, loop, ended.set), indirect=False), timeout=INFO_S
+        selector, Callback(on_reply, partial(wake, loop, ended.set), indirect=False), timeout=INFO_S
     )
     await ended.wait()
-    return sorted(names, key=natural)
 
 
 def natural(name: str) -> list[int | str]:
