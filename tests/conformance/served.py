@@ -13,6 +13,8 @@ PATIENCE = 300.0
 """Longest wait, on the slowest machine [s]: no test measures speed."""
 NOISE = ("Traceback", "leaked", "nanobind", "Exception ignored", "Fatal Python error", "panicked")
 """Words on stderr that only a fault causes."""
+NOT_REPEATED = {"tvist_server.clock.REPEAT_EVERY": 3600.0}
+"""Constants of a robot in lockstep that does not publish its last state again, however slow the machine is."""
 
 
 def finished(*words, timeout=PATIENCE, run=forked.run, **more):
@@ -31,6 +33,13 @@ def refused_to_start(*options, endpoint=None):
     return refused.returncode, refused.stderr
 
 
+def with_constants(constants):
+    """Return the words for a Python that sets constants of modules and becomes `tvist serve`."""
+    lines = [f"import {name.rpartition('.')[0]}; {name} = {value}" for name, value in constants.items()]
+    lines += ["import sys", "from tvist_cli.main import main", "sys.argv[:1] = ['tvist', 'serve']", "main()"]
+    return "-c", "\n".join(lines)
+
+
 class Served:
     """A robot in a process of its own, or several if `name` is None and --robots is given.
 
@@ -42,19 +51,31 @@ class Served:
         around: Words before the command line, such as `ip netns exec`.
         cold: Whether a new interpreter runs it instead of a fork, because its environment or start matters.
         python: Interpreter of another environment, which implies `cold`.
+        constants: Values of constants in modules, by their full names.
     """
 
     program = ("-m", "tvist_cli", "serve")  # what Python runs
 
-    def __init__(self, *options, name="ur5e", endpoint=None, router=None, around=(), cold=False, python=None):
+    def __init__(
+        self,
+        *options,
+        name="ur5e",
+        endpoint=None,
+        router=None,
+        around=(),
+        cold=False,
+        python=None,
+        constants=None,
+    ):
         self.name, self.endpoint = name, router or endpoint or free_endpoint()
         self.lines = []
         where = "--listen" if router is None else "--connect"
         named = () if name is None else ("--name", name)
         self._news = threading.Condition()
+        program = with_constants(constants) if constants else self.program
         start = subprocess.Popen if around or cold or python else forked.Popen
         self.process = start(
-            [*around, python or sys.executable, *self.program, where, self.endpoint, *named, *options],
+            [*around, python or sys.executable, *program, where, self.endpoint, *named, *options],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,

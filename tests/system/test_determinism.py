@@ -5,7 +5,7 @@ import math
 
 import msgspec
 import pytest
-from tests.conformance.served import Served
+from tests.conformance.served import NOT_REPEATED, Served
 from tests.conformance.wire import Q1
 
 from tvist_client.errors import StreamStoppedError
@@ -53,7 +53,7 @@ def swing(t):
 
 
 async def test_lockstep_over_the_network_and_in_process_give_bit_equal_states():
-    with Served("--clock", "lockstep", "--truth") as served:
+    with Served("--clock", "lockstep", "--truth", constants=NOT_REPEATED) as served:
         async with await Robot.connect(served.endpoint) as robot:
             one = await script(robot)
     async with robot_in_process(free_setup()) as robot:

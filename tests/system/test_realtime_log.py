@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from tests.conformance.served import PATIENCE, Served, finished
+from tests.conformance.served import NOT_REPEATED, PATIENCE, Served, finished
 from tests.places import own_address
 from tests.system.waiting import eventually
 
@@ -67,7 +67,11 @@ def both(tmp_path_factory):
     folder, host = tmp_path_factory.mktemp("logged"), own_address(1)
     log, recorded = folder / "realtime.csv", folder / "run.mcap"
     options = ("--clock", "lockstep", "--profile", "real", "--ur-address", host, "--record", str(recorded))
-    with Served(*options) as served, Robot.connect(served.endpoint) as robot, robot.control("mover") as arm:
+    with (
+        Served(*options, constants=NOT_REPEATED) as served,
+        Robot.connect(served.endpoint) as robot,
+        robot.control("mover") as arm,
+    ):
         robot.advance(1)  # the state before the first tick is not recorded
         command = [sys.executable, EXAMPLE, host, log]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as logger:

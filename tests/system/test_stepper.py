@@ -22,9 +22,9 @@ def test_stop_of_another_client_and_a_signal_take_effect_within_a_long_step(tmp_
     ):
         clock, token = stepper.take("clock", "stepper"), mover.take("control", "mover")
         mover.listen("state", "event")
-        assert mover.command("move_j", token=token, q=FAR)["type"] == "accepted"
+        assert mover.command("move_j", token=token, q=FAR, velocity=0.05)["type"] == "accepted"
         replies = stepper.begin("simulation.step", token=clock, ticks=LONG)
-        mover.wait("state", lambda state: state["target_qd"][0] > 0.2)
+        mover.wait("state", lambda state: state["target_qd"][0] > 0.02)
         assert mover.command("stop")["type"] == "done"
         stopped = mover.wait("event", lambda event: event["kind"] == "motion_stopped")
         assert stopped["why"] == "a stop was commanded"

@@ -6,7 +6,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
-from tests.conformance.served import PATIENCE, Served
+from tests.conformance.served import NOT_REPEATED, PATIENCE, Served
 from tests.conformance.wire import Wire
 from tests.places import own_address
 from tests.server.ur import decoders, rtde_client
@@ -80,9 +80,9 @@ def rtde(host):
 
 
 @contextmanager
-def lockstep(last, path):
+def lockstep(last, path, constants=None):
     how = ("--clock", "lockstep", "--profile", "real", "--start", "Q1", "--ur-address", own_address(last))
-    with Served(*how, "--record", str(path)) as served:
+    with Served(*how, "--record", str(path), constants=constants) as served:
         yield served, own_address(last)
 
 
@@ -109,7 +109,7 @@ def told(state, name):
 
 def test_rtde_and_real_time_interface_have_each_tick_once_with_the_values_of_zenoh(tmp_path):
     ticks = 1000
-    with lockstep(1, tmp_path / "run.mcap") as (served, host):
+    with lockstep(1, tmp_path / "run.mcap", NOT_REPEATED) as (served, host):
         with (
             Wire(served.endpoint) as stepper,
             Wire(served.endpoint) as mover,
@@ -145,7 +145,7 @@ def test_rtde_and_real_time_interface_have_each_tick_once_with_the_values_of_zen
 
 def test_program_of_the_dashboard_ends_within_one_step_of_another_client(tmp_path):
     with (
-        lockstep(3, tmp_path / "run.mcap") as (served, host),
+        lockstep(3, tmp_path / "run.mcap", NOT_REPEATED) as (served, host),
         Wire(served.endpoint) as stepper,
         dashboard(host) as interface,
     ):

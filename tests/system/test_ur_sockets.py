@@ -84,7 +84,7 @@ def test_step_in_lockstep_waits_for_a_socket_until_its_client_is_silent(tmp_path
     """The client answers in each tick, so that the program's time-out of two ticks occurs only at its end."""
     path = tmp_path / "run.mcap"
     with (
-        lockstep(52, path) as (served, host),
+        lockstep(52, path, {"tvist_server.gateways.sockets.PATIENCE": 2.5}) as (served, host),
         Wire(served.endpoint) as stepper,
         Wire(served.endpoint) as other,
         socket.create_server((host, 0)) as server,

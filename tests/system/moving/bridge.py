@@ -13,12 +13,16 @@ from tvist_client.blocking import Robot
 
 HOST, NEAR, OTHER, NOBODY = (own_address(last) for last in (51, 52, 53, 54))
 DASHBOARD, PRIMARY, SECONDARY, RTDE = 29999, 30001, 30002, 30004
+SPEED = 0.2  # of the robot's time, so that a busy machine keeps up
+SLOWED_DOWN = {"tvist_server.moving.moved_robot.SILENT": 0.08 / SPEED}
+"""Constants of a bridge, whose own time is not slowed down."""
 STEP = 0.002  # largest step of the robot's target that is not part of a motion [rad]
 
 
 @contextlib.contextmanager
 def a_bridge(host=HOST, *options):
-    with Served("--plant", f"ur://{host}", "--enable-motion", *options, name="bridge") as served:
+    motion = ("--plant", f"ur://{host}", "--enable-motion")
+    with Served(*motion, *options, name="bridge", constants=SLOWED_DOWN) as served:
         with Robot.connect(served.endpoint, "bridge") as robot, robot.control("me") as control:
             hold(robot, control)
         yield served

@@ -2,18 +2,16 @@
 
 import pytest
 from tests.conformance.served import Served
-from tests.system.moving.bridge import HOST, OTHER, a_bridge, hold, switch_on
+from tests.system.moving.bridge import HOST, OTHER, SPEED, a_bridge, hold, switch_on
 
 from tvist_client.blocking import Robot
 from tvist_protocol.modes import RobotMode
-
-SPEED = "0.2"  # speed of the robot's time, so that a busy machine keeps up
 
 
 @pytest.fixture(scope="module")
 def arm():
     """The robot in its own process; like UR's robots it shapes nothing."""
-    real = ("--profile", "real", "--shaper", "none", "--hidden", "1001", "--speed", SPEED)
+    real = ("--profile", "real", "--shaper", "none", "--hidden", "1001", "--speed", str(SPEED))
     with Served("--ur", "--ur-address", HOST, *real) as served:
         yield served
 
