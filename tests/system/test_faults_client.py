@@ -32,9 +32,12 @@ while True:
 
 @pytest.fixture(scope="module")
 def realtime():
-    """A robot in real time, which has a small send buffer at a second endpoint, `narrow`."""
+    """A robot which has a small send buffer at a second endpoint, `narrow`.
+
+    Its time is slowed down so that a process may stop for 0.4 s without an end of its stream.
+    """
     narrow = free_endpoint()
-    with Served("--listen", f"{narrow}#so_sndbuf=16384") as served:
+    with Served("--listen", f"{narrow}#so_sndbuf=16384", "--speed", "0.6") as served:
         served.narrow = narrow
         yield served
 

@@ -48,7 +48,8 @@ async def use(endpoint, told):
 def live(tmp_path_factory):
     """Path of the recording, and what a client received."""
     path, told = tmp_path_factory.mktemp("live") / "run.mcap", []
-    with Served("--record", str(path), "--truth", "--seed", "5") as served:
+    slower = ("--speed", "0.6")  # so that a process may stop for 0.4 s without an end of its stream
+    with Served("--record", str(path), "--truth", "--seed", "5", *slower) as served:
         asyncio.run(use(served.endpoint, told))
     return path, told[0]
 

@@ -8,6 +8,7 @@ from tests.conformance.served import PATIENCE
 from tests.conformance.wire import Wire
 from tests.lab.made_logs import TwoDevices
 from tests.system.shell import Ended, begun, tvist
+from tests.system.waiting import eventually, recorded_ticks
 
 NEAR = "0.1,-3.1,0.1,-1.5,0.1,0.1"
 
@@ -20,7 +21,8 @@ def recorded(lockstep, tmp_path_factory):
         assert "recording ur5e into" in process.stderr.readline()
         assert tvist("move", NEAR, "--endpoint", lockstep.endpoint).code == 0
         with Wire(lockstep.endpoint) as wire, wire.control() as token:
-            wire.step(token, 400)  # what rings after the motion
+            tick = wire.step(token, 400)["tick"]  # what rings after the motion
+        eventually(lambda: recorded_ticks(path)[-1:] >= [tick - 100])
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=PATIENCE)
     return path, Ended(process.returncode, out, err)

@@ -9,6 +9,7 @@ from tests.places import free_endpoint, free_port, own_address
 from tests.system.rtde_link import RtdeLink
 from tests.system.shell import tvist
 from tests.system.test_wrong_invocations import assert_said
+from tests.system.waiting import eventually
 
 from tvist_client import RefusedError
 from tvist_client.blocking import Robot
@@ -140,13 +141,15 @@ def test_stop_of_the_robot_is_reported_and_its_restart_survived(arm):
             assert checked.safety_mode == "PROTECTIVE_STOP"
             assert "at the robot" in checked.next
             control.unlock_protective_stop()
-        link.cut()
-        served.wait_until_said("the state stands still")
+        told = []  # stderr may omit some
         with Robot.connect(served.endpoint, "watched") as robot:
+            robot.on_event(lambda event: told.append(event.why or ""))
+            link.cut()
+            eventually(lambda: any("the state stands still" in why for why in told))
             before = robot.info().tick
             link.earlier = 30.0
             link.restore()
-            served.wait_until_said("its clock began anew")
+            eventually(lambda: any("its clock began anew" in why for why in told))
             robot.advance(10)
             assert robot.state().tick > before
             assert robot.state().safety_mode == 1

@@ -75,7 +75,7 @@ def test_killed_client_loses_control_at_once_and_its_arm_stops(holder, live):
 
 def test_killed_client_without_a_liveliness_token_keeps_control_until_its_lease_ends(realtime, start, live):
     live.listen("state", "event")
-    process = start(CLIENT, realtime.endpoint, "move", "lease_s=1.0")
+    process = start(CLIENT, realtime.endpoint, "move", "lease_s=2.0")
     live.next("state", lambda state: state["target_qd"][0] > 0.1)
     process.kill()
     assert live.command("take_control", client="heir")["code"] == "no_control"
