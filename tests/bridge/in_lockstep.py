@@ -107,8 +107,6 @@ class HiddenRobot(Side):
 
 @dataclass
 class Counts:
-    """Counts of what happened on the link and at the limits."""
-
     ticks: int = 0  # ticks since the beginning
     played: dict[int, int] = field(default_factory=dict)
     """Age of the set-points played, in ticks of the robot since the tick in which each was computed."""
@@ -136,7 +134,6 @@ class Port:
         self._measured = measured(robot.controller.latest)
 
     def measure(self):
-        """Return a measurement at the robot's target position."""
         state = self.robot.controller.latest
         found = measured(state)
         at_rest = np.zeros_like(found.q)
@@ -165,7 +162,6 @@ class Port:
         return self._measured
 
     def output(self, place):
-        """Return an integer that the program wrote."""
         return int(self.robot.controller.io(wrench=False).output_int_register[place])
 
     def _deliver(self, now):
@@ -218,7 +214,6 @@ def setup_of(description, q, payload, shaper, seed):
 
 
 def measured(state):
-    """Return the measurement in a robot's state."""
     return Measurement(
         np.array(state.actual_q), np.array(state.actual_qd), np.array(state.actual_moment),
         np.array(state.actual_tool_accelerometer), timestamp=state.timestamp,

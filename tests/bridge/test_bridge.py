@@ -95,8 +95,6 @@ def asked(description, count, seed):
 
 @dataclass
 class Made:
-    """The motions that a robot made."""
-
     peaks: list[float] = field(default_factory=list)
     """Largest acceleration of the tool later than 10 ms after the stop of each [m/s²]."""
     ends: list[np.ndarray] = field(default_factory=list)

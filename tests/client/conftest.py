@@ -75,7 +75,6 @@ class Host(LoopbackHost):
 
     @property
     def holder(self):
-        """Name of the client in control."""
         lease = self.controller.session.lease
         return None if lease is None else lease.client
 

@@ -92,7 +92,6 @@ def sent(host, wanted):
 
 
 def type_of(name):
-    """The type of the message that a method sends."""
     if name == "close_popup" or name.endswith("_program"):
         return f"program.{name.removesuffix('_program')}"
     return f"simulation.{name}" if name in {"reset", "inject"} else name

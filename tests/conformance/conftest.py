@@ -22,13 +22,11 @@ def lockstep():
 
 @pytest.fixture
 def live(realtime):
-    """A session with the robot in real time."""
     with Wire(realtime.endpoint) as wire:
         yield wire
 
 
 @pytest.fixture
 def stepped(lockstep):
-    """A session with the robot in lockstep."""
     with Wire(lockstep.endpoint) as wire:
         yield wire

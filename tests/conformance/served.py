@@ -85,8 +85,6 @@ class Served:
         self._reader.start()
 
     def wait_until_ready(self):
-        """Wait until it says that it listens."""
-
         def said():
             return any("listens " in line for line in self.lines) or not self._reader.is_alive()
 
@@ -97,7 +95,6 @@ class Served:
             raise AssertionError(f"tvist serve did not come up: {self.said}")
 
     def wait_until_said(self, words):
-        """Wait until it has written these words to stderr."""
         with self._news:
             assert self._news.wait_for(lambda: words in self.said, PATIENCE), self.said
 

@@ -91,7 +91,6 @@ class Wire:
         return self.wait(topic, wanted, since=len(self.received[topic]), **options)
 
     def state(self):
-        """Return the next state."""
         self.listen("state")
         return self.next("state")
 

@@ -129,8 +129,6 @@ def setup(description: RobotDescription = UR5E, **changes) -> Setup:
 
 
 class Kept(Sink):
-    """Keeps events, journal, states and errors."""
-
     def __init__(self) -> None:
         self.events, self.entries, self.states, self.errors = [], [], [], []
         self.event, self.journal = self.events.append, self.entries.append

@@ -23,7 +23,6 @@ def start(robot: Robot, *lines: str, name: str = "prog"):
 
 
 def playing(robot: Robot) -> bool:
-    """Return whether the program is running."""
     return robot.controller.programs.state == "PLAYING"
 
 
@@ -37,13 +36,11 @@ def finish(robot: Robot, most: int = 20_000) -> Robot:
 
 
 def run(robot: Robot, *lines: str) -> Robot:
-    """Run a program to its end."""
     start(robot, *lines)
     return finish(robot)
 
 
 def said(robot: Robot) -> list[str]:
-    """Return the texts that programs have written."""
     return [event.why for event in robot.told("text")]
 
 

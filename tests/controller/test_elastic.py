@@ -201,7 +201,6 @@ def test_a_lead_beyond_the_torque_limit_is_limited_and_reported():
 
 
 def watched_commands(robot):
-    """Return the list of drive commands from now on."""
     commands, step = [], robot.controller.cycle.plant.step
 
     def watched(command):

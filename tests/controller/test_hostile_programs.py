@@ -109,7 +109,6 @@ def stopping(seed):
 
 
 def written(robot):
-    """Return everything that programs have written."""
     places = robot.controller.peripherals
     numbers = [places.read("output_int", place) for place in range(4)]
     return places.digital_outputs, numbers, places.read("output_double", 1), list(places.analog_shares)

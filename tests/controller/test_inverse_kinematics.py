@@ -29,7 +29,6 @@ RIGHT = np.pi / 2
 
 
 def arm(a, d, alpha, limit=2 * np.pi):
-    """Return a description with these parameters."""
     joints = len(a)
     base = UR5E if joints == 6 else chain(joints)
     base = changed(base, "kinematics", a=tuple(a), d=tuple(d), alpha=tuple(alpha))

@@ -54,7 +54,6 @@ def restart(robot):
 
 
 def moves(robot):
-    """Check that the arm can move and arrives."""
     assert isinstance(robot.send(c.MoveJ, q=TARGET), Accepted)
     assert robot.until_rest().actual_q == pytest.approx(TARGET, abs=5e-4)
 

@@ -43,8 +43,6 @@ Q1, Q2 = ROBOT.poses["Q1"], ROBOT.poses["Q2"]
 
 
 class Served:
-    """A robot moved by a client, tick by tick."""
-
     def __init__(self, study=None, **changes):
         setup = free_setup(None, shaper="elastic")
         self.setup = replace(setup, description=setup.description.clean(), **changes)

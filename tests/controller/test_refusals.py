@@ -90,7 +90,6 @@ def points(*rows):
 
 
 def bent(joint, turn):
-    """Return the bent posture with a joint turned."""
     return tuple(angle + turn * (number == joint) for number, angle in enumerate(BENT.tolist()))
 
 

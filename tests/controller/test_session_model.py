@@ -75,8 +75,6 @@ def refused(right, token):
 
 
 class Sessions(RuleBasedStateMachine):
-    """A robot and clients that follow these rules."""
-
     def __init__(self, clock):
         super().__init__()
         self.setup, self.sink = setup(clock=clock), Kept()

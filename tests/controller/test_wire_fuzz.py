@@ -81,7 +81,6 @@ class Server:
         self.token = self._take()
 
     def send(self, data):
-        """Send what may be a command; its reply."""
         before = self.looks()
         reply = decode_reply(self.host.request("fuzz", data))
         if isinstance(reply, Refused):

@@ -126,7 +126,6 @@ def place(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def served(place):
-    """The robot of `serve`'s example."""
     how = shlex.split(EXAMPLES["serve"].replace("first.mcap", str(place / "served.mcap")))[2:]
     with Served(*how) as robot:
         yield robot

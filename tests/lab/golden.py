@@ -26,7 +26,6 @@ def changed(message, **fields):
 
 
 def states(count):
-    """States with random angles."""
     noise = random.Random(0)
     for tick in range(1, count + 1):
         q = [noise.gauss(0.0, 1.0) for _ in range(6)]

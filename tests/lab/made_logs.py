@@ -116,7 +116,6 @@ class SyntheticLog:
         }
 
     def without(self, *names: str) -> "SyntheticLog":
-        """Leave columns out."""
         for name in names:
             del self.columns[name]
         return self

@@ -29,8 +29,6 @@ KNOWN = calibrations.load("ur5e_5kg")
 
 @pytest.fixture
 def written(tmp_path, ur5e):
-    """Write a file and read it as moves."""
-
     def read(content):
         path = tmp_path / "moves.json"
         path.write_text(content if isinstance(content, str) else json.dumps(content), encoding="utf-8")

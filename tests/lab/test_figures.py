@@ -108,8 +108,6 @@ def texts(panel):
 
 @pytest.fixture
 def sheet(tmp_path):
-    """A style sheet with these lines."""
-
     def write(*lines):
         path = tmp_path / "mine.mplstyle"
         path.write_text("\n".join(lines))

@@ -56,7 +56,6 @@ def place_in(data, random):
 
 
 def flipped(data, _, random):
-    """Flip bits."""
     for _ in range(int(random.integers(1, 9))):
         if data:
             data[place_in(data, random) - 1] ^= 1 << int(random.integers(8))

@@ -51,8 +51,6 @@ def task(ur5e):
 
 @pytest.fixture
 def own(tmp_path, modal, request):
-    """A shaper from a file."""
-
     def make(text):
         path = tmp_path / f"{request.node.name[:20].replace('[', '_')}.py"
         path.write_text(textwrap.dedent(text), encoding="utf-8")

@@ -43,8 +43,6 @@ FEWER = {
 
 
 def recorded(ring_downs, seed, payloads=PAYLOADS, description=ROBOT):
-    """Jogs of the robot."""
-
     async def run():
         setup = replace(free_setup(calibration="none", seed=seed, truth=False), description=ROBOT)
         async with robot_in_process(setup) as robot, robot.control("test") as arm:

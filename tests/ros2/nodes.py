@@ -49,7 +49,6 @@ class MemoryNode(Node):
         pass
 
     def send(self, name, message):
-        """Let the gateway receive a message."""
         self._subscribed[name](decode(type(message), encode(message)))
 
     def ask(self, name, request):
@@ -90,7 +89,6 @@ class SteppedRobot:
 
     @property
     def now(self):
-        """ROS time."""
         return ros.Time(*divmod(round(1e9 * self.host.controller.report.state.timestamp), 10**9))
 
     @property
@@ -108,12 +106,10 @@ class SteppedRobot:
         return uuid, answer.accepted
 
     def result(self, uuid):
-        """Start to ask for a goal's result."""
         request = ros.FollowJointTrajectory_GetResult_Request(uuid)
         return self.node.ask(f"{ACTION}/get_result", request)
 
     async def cancel(self, uuid, until=ros.Time()):  # noqa: B008  it cannot change
-        """Cancel the goals of an identifier and a time."""
         request = ros.CancelGoal_Request(ros.GoalInfo(uuid, until))
         return await self.until(self.node.ask(f"{ACTION}/cancel_goal", request))
 
@@ -122,12 +118,10 @@ class SteppedRobot:
         self.node.send(f"{CONTROLLER}/joint_trajectory", trajectory_of(points, **more))
 
     async def trigger(self, name):
-        """Call a service of the dashboard."""
         return await self.until(self.node.ask(f"dashboard_client/{name}", ros.Trigger_Request()))
 
 
 def trajectory_of(points, names=JOINTS, stamp=0.0):
-    """Return a JointTrajectory with points (time, q, qd)."""
     return ros.JointTrajectory(
         ros.Header(ros.Time(*divmod(round(stamp * 1e9), 10**9))),
         joint_names=list(names),
@@ -144,7 +138,6 @@ def duration(seconds):
 
 @asynccontextmanager
 async def stepped_robot(node=None, rate=500.0, **setup):
-    """Run a robot in lockstep behind a gateway."""
     host = LoopbackHost(free_setup(clock="lockstep", **setup))
     robot, other = Robot.over(LoopbackTransport(host)), Robot.over(LoopbackTransport(host, "clock"))
     node = node or MemoryNode()

@@ -70,7 +70,6 @@ class Peer:
         return replies
 
     async def call(self, name, of, request):
-        """Call a service."""
         replies = []
         while not replies:  # this session may not have learned of the service yet
             replies = await self.replies(key(0, name, of), encode(request))

@@ -29,8 +29,6 @@ LEAD = 1e-8
 
 @dataclass
 class Journey:
-    """A path that the robot accepts."""
-
     q: np.ndarray
     path: dict
     legs: list[Leg]

@@ -36,7 +36,6 @@ class ProgramSequence(Sequence):
         return _SENT
 
     def note(self, name, reply):
-        """Take note of a command's reply."""
         if not isinstance(reply, Refused) and name in STOPPERS | STARTERS:
             self._still = name in STOPPERS
             self._earlier = frozenset(self.robot.numbers)
@@ -51,13 +50,11 @@ class ProgramSequence(Sequence):
         return text
 
     def load_program(self):
-        """Load a program, and play it."""
         text = self.text()
         self.robot.send(p.ProgramLoad, name=f"p{self._texts}", text=text)
         return self.robot.send(p.ProgramPlay)
 
     def write(self):
-        """Write a register."""
         values = (int(self._random.integers(9)),)
         return self.robot.send(SetRegisters, bank="input_int", first=0, values=values)
 

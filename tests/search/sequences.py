@@ -79,8 +79,6 @@ class BrokenError(AssertionError):
 
 
 class Sequence:
-    """One sequence with its checks."""
-
     def __init__(self, description, seed):
         self.seed, self.description = seed, description
         self._random = np.random.default_rng([seed, 15])

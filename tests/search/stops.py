@@ -47,8 +47,6 @@ KINDS: dict[str, Halt] = {
 
 @dataclass(frozen=True)
 class Case:
-    """One stop of one move."""
-
     seed: int
     kind: str
     start: Floats
@@ -131,7 +129,6 @@ def judge(description, case):
 
 
 def moving(description, case):
-    """Return a robot that has just accepted the case's move."""
     robot = Subject(description, case.start, paper_payload(description, case.mass), shaper=case.shaper)
     robot.send(c.SetSpeed, fraction=case.speed)
     reply = robot.send(

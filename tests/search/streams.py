@@ -32,8 +32,6 @@ cubed: a cubic through four samples errs by 1/42 of that where the jerk begins o
 
 @dataclass(frozen=True)
 class StreamCase:
-    """One stream."""
-
     seed: int
     start: Floats
     towards: Floats

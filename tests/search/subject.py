@@ -59,8 +59,6 @@ class RigidArm:
 
 @dataclass
 class Subject:
-    """A robot under test."""
-
     description: RobotDescription
     q: Floats
     payload: Declared

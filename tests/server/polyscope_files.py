@@ -2,7 +2,6 @@
 
 
 def saved(*nodes, before="", threads="", repeats=False, **attributes):
-    """A program of nodes."""
     given = "".join(f' {name}="{value}"' for name, value in attributes.items())
     once = str(not repeats).lower()
     main = f"<MainProgram runOnlyOnce='{once}'{given}><children>{''.join(nodes)}</children>"
@@ -20,21 +19,18 @@ def _characters(text):
 
 
 def waypoint(name, q, parameters="<motionParameters/>", kinematics=""):
-    """A taught waypoint."""
     angles = ", ".join(map(str, q))
     position = f"<position><JointAngles angles='{angles}'/>{kinematics}</position>"
     return f"<Waypoint type='Fixed' name='{name}'>{parameters}{position}</Waypoint>"
 
 
 def move(*nodes, kind="MoveJ", inside="", **attributes):
-    """A Move node."""
     given = {"speed": 1.5, "acceleration": 2.0, "useActiveTCP": "true"} | attributes
     words = " ".join(f"{name}='{value}'" for name, value in given.items())
     return f"<Move motionType='{kind}' {words}>{inside}<children>{''.join(nodes)}</children></Move>"
 
 
 def contributed(cap, kind, *nodes, name="Robotiq_Grippers", **data):
-    """A node of a URCap."""
     model = "".join(f"<data key='{key}' value='{value}'/>" for key, value in data.items())
     inside = f"<children>{''.join(nodes)}</children>" if nodes else ""
     words = f"strategyClass='{cap}' strategyProgramNodeType='{kind}' strategyURCapName='{name}'"

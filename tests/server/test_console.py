@@ -10,7 +10,6 @@ STOP = Event(tick=7, kind="protective_stop", code="limit_torque", why="torque of
 
 
 def lines_of(console, caplog):
-    """Close a console and return its lines."""
     console.start()
     console.close()
     console._thread.join()

@@ -292,7 +292,6 @@ def test_on_a_bad_link_deviations_are_smooth_and_decay(seed, speed):
 
 
 def garbled(random, package, wildness):
-    """Return a package with random errors."""
     package = list(package)
     if random.random() < 0.01:
         at = random.integers(2, len(package))

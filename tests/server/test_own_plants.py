@@ -108,7 +108,6 @@ def test_a_plant_or_shaper_is_pickled_by_reference_to_its_unchanged_file(place, 
 
 
 def moved(chosen, path, ticks=300):
-    """Return the recording of a move."""
     host = LoopbackHost(chosen)
     token = decode_reply(host.request("a", encode(c.TakeControl(client="a", lease_s=30.0)))).token
     assert decode_reply(host.request("a", encode(c.MoveJ(token=token, q=tuple(Q2.tolist()))))).id == 1

@@ -149,7 +149,6 @@ def test_a_shaper_longer_than_the_largest_delay_is_refused(file):
 
 
 def robot(shaper):
-    """Return a robot with an own shaper."""
     given = OwnShaper("mine.py", "mine", "0" * 64, shaper)
     return Robot(calibration=calibration(), shaper=given.name, own_shapers=(given,))
 
@@ -249,7 +248,6 @@ def test_a_failing_shaper_is_refused_also_by_the_planner(failing):
 
 @pytest.fixture
 def recorded(file, tmp_path):
-    """A recording of a motion with an own shaper."""
     own = (load_own(f"{file}:mine"),)
     return moved(setup(calibration=calibration(), shaper="mine", own_shapers=own), tmp_path / "run.mcap")
 

@@ -49,12 +49,10 @@ class Served:
         return kind(token=self.token, **fields)
 
     def serve(self, replies):
-        """Run jobs until there are this many replies."""
         while len(self.replies) < replies:
             self.do_next()
 
     def do_next(self):
-        """Wait for the next job and run it."""
         with self.came:
             assert self.came.wait_for(lambda: self.jobs, WAIT), "no job came"
             job = self.jobs.popleft()

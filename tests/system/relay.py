@@ -28,7 +28,6 @@ class Relay:
 
     @property
     def endpoint(self):
-        """Return its address in Zenoh's notation."""
         return "tcp/{}:{}".format(*self._near)
 
     def __enter__(self):
@@ -46,7 +45,6 @@ class Relay:
         self._flowing.set()
 
     def cut(self):
-        """Close all connections, and refuse new ones."""
         with self._lock:
             listening, self._listening = self._listening, None
             ended, self._open = self._open, set()
@@ -57,7 +55,6 @@ class Relay:
         self.flow()
 
     def restore(self):
-        """Accept connections again at the same address."""
         self._listening = listening = socket.create_server(self._near)
         threading.Thread(target=self._accept, args=(listening,), daemon=True).start()
 

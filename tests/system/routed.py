@@ -4,8 +4,6 @@ from tests.conformance.served import Served
 
 
 class Router(Served):
-    """`tvist router` in a process."""
-
     program = ("-m", "tvist_cli", "router")
 
     def __init__(self, *options, endpoint=None, around=()):

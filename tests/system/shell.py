@@ -10,8 +10,6 @@ from tests.conformance.served import NOISE, finished
 
 
 class Ended(NamedTuple):
-    """A program that has ended, with exit code and output."""
-
     code: int
     out: str
     err: str

@@ -76,7 +76,6 @@ done
 
 
 def shown(shell, folder, *words):
-    """Return what a shell prints."""
     if shutil.which(shell) is None:
         pytest.skip(f"there is no {shell}")
     script(shell, folder)

@@ -46,7 +46,6 @@ def engine(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def robot(engine):
-    """A robot in a container."""
     with Contained(engine) as robot:
         yield robot
 

@@ -11,8 +11,6 @@ from tvist_protocol.errors import RefusedError
 
 
 class PublishedRecording(Served):
-    """A process that publishes a recording."""
-
     program = ("-m", "tvist_cli", "log", "replay")
 
 

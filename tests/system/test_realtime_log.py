@@ -38,7 +38,6 @@ COLUMNS = {
 
 
 def logged(path):
-    """Return the columns of the log."""
     with path.open(encoding="utf-8") as file:
         rows = csv.reader(file)
         names = next(rows)

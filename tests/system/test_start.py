@@ -35,7 +35,6 @@ class SlowlyServed(Served):
 
 
 def asked(session, keys):
-    """Return the answers to plain queries."""
     found = []
     for key in keys:
         payload = encode(TakeControl(client="eager")) if key.endswith("command") else None

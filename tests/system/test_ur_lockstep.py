@@ -27,8 +27,6 @@ def timestamps(ticks):
 
 
 class Connection:
-    """A connection to a port of a robot."""
-
     def __init__(self, host, port):
         self.socket = socket.create_connection((host, port), PATIENCE)
         self._stream = self.socket.makefile("rb")
@@ -54,7 +52,6 @@ class Connection:
         return length + self.take(struct.unpack(head, length)[0] - len(length))
 
     def ask(self, line):
-        """Send a line to the dashboard; return its answer."""
         self.send(f"{line}\n".encode())
         return self.line()
 

@@ -26,7 +26,6 @@ def processes(served):
 
 
 def states(endpoint, name, ticks=200):
-    """Return the states of a stepped robot in a motion."""
     with Wire(endpoint, name) as wire:
         wire.listen("state")
         with wire.control() as token:

@@ -49,7 +49,6 @@ def wave(number):
 
 
 def steer(stream, postures):
-    """Send joint positions, and read the answers."""
     for q in postures:
         stream.sendall(struct.pack(">6i", *(round(1e6 * angle) for angle in q)))
         stream.recv(4096)

@@ -56,7 +56,6 @@ class FakeControl:
         return later
 
     def asked(self, reply):
-        """Return an awaitable that has the reply already."""
         later = Deferred()
         later.set(reply)
         return later
@@ -84,7 +83,6 @@ class FakeControl:
         self.left += 1
 
     def of(self, kind):
-        """The recorded commands of one kind."""
         return [command for command in self.commands if isinstance(command, kind)]
 
 
@@ -126,7 +124,6 @@ def sent() -> list[bytes]:
 
 @pytest.fixture(scope="session")
 def ur5e() -> Callable[..., Robot]:
-    """Return a function that makes robots."""
     return Robot
 
 

@@ -30,7 +30,6 @@ class Cursor:
 
 
 def split(stream: bytes) -> list[tuple[int, bytes]]:
-    """Type and body of every package."""
     packages, cursor = [], Cursor(stream)
     while not cursor.done:
         begin = cursor.at
@@ -44,8 +43,6 @@ def split(stream: bytes) -> list[tuple[int, bytes]]:
 
 @dataclass
 class Message:
-    """A robot message."""
-
     kind: int
     time: int
     source: int
@@ -105,7 +102,6 @@ _MESSAGES = {
 
 
 def parts(body: bytes) -> list[tuple[int, bytes]]:
-    """Number and body of each part of a robot state."""
     found, cursor = [], Cursor(body)
     while not cursor.done:
         begin = cursor.at

@@ -14,7 +14,6 @@ async def nobody(_host):
 
 
 async def here(read):
-    """Read a file at once."""
     return read()
 
 

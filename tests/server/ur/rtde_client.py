@@ -76,7 +76,6 @@ def inputs(names):
 
 
 def data(number, names, values):
-    """A data package from the client."""
     layout = ">B" + "".join(WORD[INPUT_TYPES[name]] for name in names)
     flat = [n for value in values for n in (value if isinstance(value, tuple) else (value,))]
     return package("U", struct.pack(layout, number, *flat))

@@ -86,7 +86,6 @@ async def connect(served, interface):
 
 
 async def until(condition):
-    """Let the loop run until a condition is met."""
     async with asyncio.timeout(PATIENCE):
         while not condition():  # noqa: ASYNC110  what changes belongs to the loop
             await asyncio.sleep(0)
@@ -108,7 +107,6 @@ async def connect_and_greet(served):
 
 
 async def package(reader):
-    """Return the type of the next RTDE package."""
     head = await asyncio.wait_for(reader.readexactly(3), PATIENCE)
     await reader.readexactly(struct.unpack(">H", head[:2])[0] - 3)
     return head[2:]

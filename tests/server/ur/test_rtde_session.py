@@ -26,8 +26,6 @@ doubles = [f"input_double_register_{k}" for k in range(48)]
 
 
 class Client:
-    """The client's end of a connection."""
-
     def __init__(self, robot, control):
         self.control = control
         self.stream = bytearray()
@@ -35,7 +33,6 @@ class Client:
         self.session.opened()
 
     def say(self, *packages):
-        """Send packages; return the answers."""
         self.session.receive(b"".join(packages))
         return self.heard()
 
@@ -54,7 +51,6 @@ class Client:
         return self
 
     def with_inputs(self, *recipes):
-        """Set up input recipes."""
         self.say(client.version())
         for number, names in enumerate(recipes, 1):
             types = ",".join(client.INPUT_TYPES[name] for name in names).encode()

@@ -78,7 +78,6 @@ def beside(robot, change):
 
 @contextlib.contextmanager
 def states_of(robot):
-    """Collect the states of a robot."""
     states = []
     stop = robot.on_state(states.append)
     try:

@@ -21,7 +21,6 @@ def ring(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def served(ring):
-    """A secured robot."""
     endpoint = free_tls_endpoint()
     with Served("--security", str(ring), "--truth", endpoint=endpoint) as served:
         yield served

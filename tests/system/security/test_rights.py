@@ -52,7 +52,6 @@ def everything(wire):
 
 
 def keys_in(heard):
-    """Return the keys of what such a queue contains."""
     found = set()
     while not heard.empty():
         item = heard.get()
