@@ -13,19 +13,19 @@ import zenoh
 from zenoh.handlers import Callback
 
 from tvist_client.connection import understood
-from tvist_client.errors import MisuseError, UnexpectedReplyError
+from tvist_client.errors import MisuseError, NotConnectedError, UnexpectedReplyError
 from tvist_client.readiness import RELIEVE, Readiness, readiness, unlock_command
 from tvist_client.robot import ENDPOINT
 from tvist_client.transports.certificates import Folder
 from tvist_client.transports.inbox import wake
 from tvist_client.transports.session import ask, close_session, open_session
-from tvist_client.transports.zenoh import for_each_robot, natural
+from tvist_client.transports.zenoh import natural, query_tokens
 from tvist_protocol import Info, ProtocolError, Refused, State, Stop, Telemetry, keys
 from tvist_protocol.codec import decode, decode_reply, encode
 
 T = TypeVar("T")
 ANSWER_S = 3.0  # longest wait for a robot's answer [s]
-LISTEN_S = 1.3  # time in which every robot in real time publishes its telemetry at least once [s]
+LISTEN_S = 1.6  # time in which every robot in real time publishes its telemetry at least once [s]
 _TIMING = ("ticks_per_second", "missed_ticks", "late_p99_us", "load", "due_ticks", "overloaded")
 """Fields of `FleetRobot` that come from telemetry."""
 _OF_INFO = ("model", "clock", "control")  # fields of a fleet's robot that its `info` has
@@ -66,7 +66,11 @@ class FleetSession(ABC):
     async def __aenter__(self) -> Self:
         self._loop = asyncio.get_running_loop()
         self._session = await asyncio.to_thread(open_session, self._endpoint, self._security)
-        await self._subscribe()
+        try:
+            await self._subscribe()
+        except BaseException:
+            await asyncio.to_thread(close_session, self._session)
+            raise
         return self
 
     async def __aexit__(
@@ -142,8 +146,10 @@ class Fleet(FleetSession):
         )
         self._session.liveliness().declare_subscriber(alive, self._of_robots(self._on_token), history=True)
         self._session.declare_subscriber(telemetry, self._of_robots(self._on_telemetry))
-        # When this query ends, the tokens of all robots have come; on a slow machine that takes a while.
-        await for_each_robot(self._session, alive, lambda *place: self.places.add(RobotPlace(*place)))
+        # The subscriber gets the tokens of all present robots before this query ends.
+        if await query_tokens(self._session, alive, ANSWER_S) is None:
+            late = f"{self._endpoint} has not named all robots within {ANSWER_S:g} s"
+            raise NotConnectedError(f"{late}: try again, or restart the router there")
 
     async def listen(self) -> None:
         """Wait until every robot in real time has published its telemetry."""

@@ -7,9 +7,10 @@ from functools import partial
 
 import pytest
 import zenoh.ext
-from tests.conformance.served import Served, finished, refused_to_start
+from tests.conformance.served import PATIENCE, Served, finished, refused_to_start
 from tests.places import free_endpoint
 from tests.ros2.nodes import ACTION, JOINTS, stepped_robot, trajectory_of
+from tests.system.waiting import eventually
 from zenoh.handlers import Callback
 
 from tvist_client.errors import NotConnectedError
@@ -33,7 +34,7 @@ SEND_GOAL, GET_RESULT, TRIGGER = (
         "std_srvs/srv/Trigger",
     )
 )
-SERVICES = 12
+SERVICES = 12  # of a robot's node
 IDENTIFIER = bytes(range(16))
 ATTACHED = ATTACHMENT.pack(7, 0, 16, IDENTIFIER)
 
@@ -79,7 +80,7 @@ class Peer:
         return decode(of.response, bytes(reply.ok.payload))
 
     def tokens(self):
-        replies = self.session.liveliness().get("@ros2_lv/**", timeout=5)
+        replies = self.session.liveliness().get("@ros2_lv/**", timeout=PATIENCE)
         return {str(reply.ok.key_expr) for reply in replies}
 
 
@@ -93,8 +94,7 @@ async def over_zenoh():
     try:
         async with stepped_robot(node, calibration="none", shaper="none") as robot:
             # The router drops messages of which it knows no receiver yet. Services are announced last.
-            while sum("/SS/" in token for token in peer.tokens()) < SERVICES:
-                pass
+            eventually(lambda: sum("/SS/" in token for token in peer.tokens()) == SERVICES)
             yield robot, peer
     finally:
         close_session(peer.session)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.conformance.served import Served
+from tests.conformance.served import SLOWER, Served
 from tests.conformance.wire import Q1, STOPPED, TICK
 
 from tvist_lab.recordings.mcap_file import read
@@ -31,8 +31,7 @@ STREAM = ("amplitude=0.4", "rate=2.0")  # up to 0.8 rad/s and 1.6 rad/s²; the l
 def test_arm_stops_within_260_ms_and_its_limits_after_a_client_dies(times, most, start, tmp_path, measured):
     """Each client ends after a random number of set-points; nightly some are suspended or have a token."""
     path, rng, ends = tmp_path / "run.mcap", random.Random(0), []
-    slower = ("--speed", "0.6")  # so that a process may stop for 0.4 s without an end of its stream
-    with Served("--record", str(path), *slower) as served:
+    with Served("--record", str(path), *SLOWER) as served:
         with Bystander(served.endpoint) as bystander:
             limits = bystander.info()["limits"]
             for number in range(times):

@@ -7,7 +7,7 @@ import signal
 from pathlib import Path
 
 import pytest
-from tests.conformance.served import Served, free_endpoint
+from tests.conformance.served import SLOWER, Served, free_endpoint
 from tests.conformance.wire import STOPPED, TICK
 
 pytestmark = pytest.mark.realtime
@@ -32,12 +32,9 @@ while True:
 
 @pytest.fixture(scope="module")
 def realtime():
-    """A robot which has a small send buffer at a second endpoint, `narrow`.
-
-    Its time is slowed down so that a process may stop for 0.4 s without an end of its stream.
-    """
+    """A robot which has a small send buffer at a second endpoint, `narrow`."""
     narrow = free_endpoint()
-    with Served("--listen", f"{narrow}#so_sndbuf=16384", "--speed", "0.6") as served:
+    with Served("--listen", f"{narrow}#so_sndbuf=16384", *SLOWER) as served:
         served.narrow = narrow
         yield served
 
@@ -67,7 +64,7 @@ def test_suspended_client_loses_control_when_its_link_times_out(realtime, bystan
     done = bystander.event("motion_done")
     lost = bystander.event("lease_lost")
     assert "dying" in lost["why"]
-    measured("from SIGSTOP to lease_lost [s of tick time]", (lost["tick"] - tick) * TICK)
+    measured("from SIGSTOP to lease_lost [s of slower time]", (lost["tick"] - tick) * TICK)
     assert done["tick"] < lost["tick"]
     with bystander.control("heir"):
         pass
@@ -84,7 +81,7 @@ def test_client_that_queries_without_reading_is_disconnected(realtime, bystander
         asked = bystander.received["state"][-1]["tick"]
         bystander.info()
         longest = max(longest, bystander.received["state"][-1]["tick"] - asked)
-    measured("longest time to an answer meanwhile [s of tick time]", longest * TICK)
+    measured("longest time to an answer meanwhile [s of slower time]", longest * TICK)
     bystander.assert_undisturbed()
     realtime.assert_quiet()
 

@@ -13,10 +13,13 @@ from tests.conformance.served import PATIENCE, Served, free_endpoint
 from tests.conformance.wire import Q1, Wire
 from zenoh.handlers import Callback
 
+from tvist_client import NotConnectedError, fleet
 from tvist_client.fleet import Fleet, ManyStates, RobotPlace
+from tvist_client.transports.session import open_session
 from tvist_server.gateways import network
 
 from .keyring import forge, free_tls_endpoint, made
+from .relay import Relay
 from .routed import Router
 from .shell import begun, tvist
 from .test_wrong_invocations import assert_said
@@ -38,7 +41,20 @@ def robots(router):
         Served(*LOCKSTEP, "--robots", "ur5e*2", name=None, router=router.endpoint),
         Served(*LOCKSTEP, "--namespace", "hall-3/line-1", name="ur5e-1", router=router.endpoint) as third,
     ):
+        found(router.endpoint, 3)
         yield third
+
+
+def found(endpoint, number):
+    """Wait until a router names this many robots; return what they tell."""
+
+    async def look():
+        async with Fleet(endpoint) as fleet:
+            while len(fleet.places) < number:  # noqa: ASYNC110  tokens come from another thread
+                await asyncio.sleep(0.1)
+            return await fleet.look()
+
+    return asyncio.run(asyncio.wait_for(look(), PATIENCE))
 
 
 ALL = [RobotPlace("", "ur5e-1"), RobotPlace("", "ur5e-2"), RobotPlace("hall-3/line-1", "ur5e-1")]
@@ -82,6 +98,20 @@ def test_stop_reaches_all_robots_and_reports_a_missing_one(router, robots):
     assert reports == [("ur5e-9", False, "it does not answer"), ("ur5e-1", True, "stopped")]
 
 
+async def test_router_that_does_not_name_all_robots_is_reported(router, monkeypatch):
+    with Relay(router.endpoint) as link:
+
+        def held(*where):
+            session = open_session(*where)
+            link.hold()
+            return session
+
+        monkeypatch.setattr(fleet, "open_session", held)
+        monkeypatch.setattr(fleet, "ANSWER_S", 0.1)
+        with pytest.raises(NotConnectedError, match="has not named all robots within"):
+            await Fleet(link.endpoint).__aenter__()
+
+
 def test_watch_shows_all_robots_or_the_states_of_one(router, robots):
     def first_line(*options):
         with begun("watch", router.endpoint, *options, "--json") as process:
@@ -106,15 +136,7 @@ def test_robots_run_on_and_are_found_again_after_a_router_was_killed():
         router.process.send_signal(signal.SIGKILL)
         router.wait()
         with Router(endpoint=router.endpoint) as again:
-
-            async def back():
-                async with Fleet(again.endpoint) as fleet:
-                    while len(fleet.places) < 2:  # noqa: ASYNC110  tokens come from another thread
-                        await asyncio.sleep(0.1)
-                    return await fleet.look()
-
-            found = asyncio.run(asyncio.wait_for(back(), PATIENCE))
-            assert [robot.safety_mode for robot in found] == ["NORMAL", "NORMAL"]
+            assert [robot.safety_mode for robot in found(again.endpoint, 2)] == ["NORMAL", "NORMAL"]
 
 
 def test_router_reduces_the_rate_of_states_of_each_listed_robot_but_not_of_events():

@@ -5,7 +5,7 @@ import math
 
 import msgspec
 import pytest
-from tests.conformance.served import Served
+from tests.conformance.served import SLOWER, Served
 
 from tvist_client.robot import Robot
 from tvist_lab.collect import collect
@@ -48,8 +48,7 @@ async def use(endpoint, told):
 def live(tmp_path_factory):
     """Path of the recording, and what a client received."""
     path, told = tmp_path_factory.mktemp("live") / "run.mcap", []
-    slower = ("--speed", "0.6")  # so that a process may stop for 0.4 s without an end of its stream
-    with Served("--record", str(path), "--truth", "--seed", "5", *slower) as served:
+    with Served("--record", str(path), "--truth", "--seed", "5", *SLOWER) as served:
         asyncio.run(use(served.endpoint, told))
     return path, told[0]
 

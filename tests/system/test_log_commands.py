@@ -22,7 +22,7 @@ def recorded(lockstep, tmp_path_factory):
         assert tvist("move", NEAR, "--endpoint", lockstep.endpoint).code == 0
         with Wire(lockstep.endpoint) as wire, wire.control() as token:
             tick = wire.step(token, 400)["tick"]  # what rings after the motion
-        eventually(lambda: recorded_ticks(path)[-1:] >= [tick - 100])
+        eventually(lambda: recorded_ticks(path)[-1:] >= [tick - 100])  # all but the last chunk
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=PATIENCE)
     return path, Ended(process.returncode, out, err)

@@ -32,7 +32,7 @@ PROGRAM = """def driver():
     if got[0] == 6:
       q = [got[1], got[2], got[3], got[4], got[5], got[6]] / 1000000
       socket_send_int(1, "driver")
-      got = socket_read_binary_integer(6, "driver", 0.5)
+      got = socket_read_binary_integer(6, "driver", 0.2)
     else:
       going = False
     end

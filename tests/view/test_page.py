@@ -70,7 +70,7 @@ def is_fast(state):
 
 
 def press(tab, wire):
-    """Press until the arm moves or its stream ends; return its state, and how many events and states came before."""
+    """Press until the arm moves or its stream ends; return its state, and the events and states before."""
     events, states = len(wire.received["event"]), len(wire.received["state"])
 
     def has_ended():
@@ -91,12 +91,12 @@ def jog(tab, sign, wire):
     button = tab.get_by_role("button", name=f"{sign} hold to jog")
     button.scroll_into_view_if_needed()
     button.hover()
-    state, events, states = press(tab, wire)
-    while not is_fast(state):
+    while True:
+        state, events, states = press(tab, wire)
+        if is_fast(state):
+            return events, states
         tab.mouse.up()
         wire.until(state["tick"] + round(1.0 / TICK))  # until the server of the page has noticed
-        state, events, states = press(tab, wire)
-    return events, states
 
 
 def silence(wire, stopped, states):

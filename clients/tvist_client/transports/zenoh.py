@@ -248,23 +248,19 @@ async def _opened(endpoint: str, security: Folder | None, namespace: str) -> zen
 
 async def _robots(session: zenoh.Session) -> list[str]:
     """Return the names of the reachable robots, in natural order: ur5e-2 before ur5e-10."""
-    names = list[str]()
-    await for_each_robot(session, keys.ANY_ALIVE, lambda _, name: names.append(name))
-    return sorted(names, key=natural)
+    tokens = await query_tokens(session, keys.ANY_ALIVE, INFO_S) or ()
+    return sorted((place[1] for key in tokens if (place := keys.place(key)) is not None), key=natural)
 
 
-async def for_each_robot(session: zenoh.Session, selector: str, take: Callable[[str, str], None]) -> None:
-    """Call a function with namespace and name of each robot whose liveliness token a key selects."""
+async def query_tokens(session: zenoh.Session, selector: str, seconds: float) -> list[str] | None:
+    """Return the liveliness tokens that a key selects; None if the router has not told all of them in time."""
     loop, ended = asyncio.get_running_loop(), asyncio.Event()
-
-    def on_reply(reply: zenoh.Reply) -> None:
-        if reply.ok is not None and (place := keys.place(str(reply.ok.key_expr))) is not None:
-            wake(loop, partial(take, *place))
-
-    session.liveliness().get(
-        selector, Callback(on_reply, partial(wake, loop, ended.set), indirect=False), timeout=INFO_S
-    )
+    replies = list[zenoh.Reply]()
+    callback = Callback(replies.append, partial(wake, loop, ended.set), indirect=False)
+    session.liveliness().get(selector, callback, timeout=seconds)
     await ended.wait()
+    tokens = [str(reply.ok.key_expr) for reply in replies if reply.ok is not None]
+    return tokens if len(tokens) == len(replies) else None
 
 
 def natural(name: str) -> list[int | str]:

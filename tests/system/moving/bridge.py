@@ -10,12 +10,13 @@ from tests.system.waiting import eventually
 
 from tvist_client import RefusedError
 from tvist_client.blocking import Robot
+from tvist_server.moving.moved_robot import SILENT
 
 HOST, NEAR, OTHER, NOBODY = (own_address(last) for last in (51, 52, 53, 54))
 DASHBOARD, PRIMARY, SECONDARY, RTDE = 29999, 30001, 30002, 30004
 SPEED = 0.2  # of the robot's time, so that a busy machine keeps up
-SLOWED_DOWN = {"tvist_server.moving.moved_robot.SILENT": 0.08 / SPEED}
-"""Constants of a bridge, whose own time is not slowed down."""
+SLOWED_DOWN = {"tvist_server.moving.moved_robot.SILENT": SILENT / SPEED}
+"""Constants of a bridge whose robot is slowed down."""
 STEP = 0.002  # largest step of the robot's target that is not part of a motion [rad]
 
 
