@@ -72,19 +72,18 @@ class Served:
         constants=None,
     ):
         self.name, self.endpoint = name, router or endpoint or free_endpoint()
-        self.lines = []
         where = "--listen" if router is None else "--connect"
         named = () if name is None else ("--name", name)
-        self._news = threading.Condition()
         program = with_constants(constants) if constants else self.program
         start = subprocess.Popen if around or cold or python else forked.Popen
-        self.process = start(
-            [*around, python or sys.executable, *program, where, self.endpoint, *named, *options],
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            text=True,
-            env={**os.environ, "PYTHONUNBUFFERED": "1"},
-        )
+        words = [*around, python or sys.executable, *program, where, self.endpoint, *named, *options]
+        self._begin(start, words, {**os.environ, "PYTHONUNBUFFERED": "1"})
+
+    def _begin(self, start, words, environment):
+        """Start a program, and read what it writes to stderr."""
+        self.lines, self._news = [], threading.Condition()
+        pipes = {"stdout": subprocess.DEVNULL, "stderr": subprocess.PIPE, "text": True}
+        self.process = start(words, env=environment, **pipes)
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 

@@ -83,10 +83,11 @@ def path(*segments):
     return {"segments": segments}
 
 
-def points(*rows):
-    """Return points of a trajectory from rows of time, q and perhaps qd and qdd."""
+def through(*rows):
+    """Return the command of a trajectory, and its points from rows of time, q and perhaps qd and qdd."""
     names = ("time", "q", "qd", "qdd")
-    return {"points": tuple(m.TrajectoryPoint(**dict(zip(names, row, strict=False))) for row in rows)}
+    points = tuple(m.TrajectoryPoint(**dict(zip(names, row, strict=False))) for row in rows)
+    return m.MoveTrajectory, {"points": points}
 
 
 def bent(joint, turn):
@@ -113,24 +114,12 @@ WRONG = [  # command, content, code and field; the limit told, or words that hel
     (c.MoveJ, {"q": Q2_, "acceleration": 5e-324}, "out_of_range", "acceleration"),
     (c.MoveJ, {"q": Q2_, "jerk": 3000.0}, "out_of_range", "jerk", MOST.jerk[0]),
     (c.MoveJ, {"q": Q2_, "jerk": 1e-300}, "out_of_range", "jerk"),
-    (m.MoveTrajectory, points((1.0, Q2_), (1.0, Q2_)), "out_of_range", "points[1].time"),
-    (m.MoveTrajectory, points((0.0, Q2_)), "out_of_range", "points[0].time"),
-    (m.MoveTrajectory, points((1.0, Q2_), (2.0, Q2_[:5])), "out_of_range", "points[1].q", 6),
-    (
-        m.MoveTrajectory,
-        points((1.0, Q2_), (2.0, Q2_, REST)),
-        "out_of_range",
-        "points[1].qd",
-        "for all points or",
-    ),
-    (m.MoveTrajectory, points((1.0, Q2_, None, REST)), "missing_field", "points[0].qd"),
-    (
-        m.MoveTrajectory,
-        points((1.0, Q2_, (0.1, *REST[1:]))),
-        "out_of_range",
-        "points[0].qd",
-        "begins and ends",
-    ),
+    (*through((1.0, Q2_), (1.0, Q2_)), "out_of_range", "points[1].time"),
+    (*through((0.0, Q2_)), "out_of_range", "points[0].time"),
+    (*through((1.0, Q2_), (2.0, Q2_[:5])), "out_of_range", "points[1].q", 6),
+    (*through((1.0, Q2_), (2.0, Q2_, REST)), "out_of_range", "points[1].qd", "for all points or"),
+    (*through((1.0, Q2_, None, REST)), "missing_field", "points[0].qd"),
+    (*through((1.0, Q2_, (0.1, *REST[1:]))), "out_of_range", "points[0].qd", "begins and ends"),
     (c.ServoStart, {"velocity": 4.0}, "limit_velocity", "velocity"),
     (c.ServoStart, {"acceleration": 1e-9}, "out_of_range", "acceleration"),
     (m.ServoJ, {"q": (7.0, *REST[1:])}, "limit_position", "q[0]"),
@@ -186,7 +175,7 @@ WRONG = [  # command, content, code and field; the limit told, or words that hel
     (SimulationInject, torque(), "missing_field", "joint"),
     (SimulationInject, torque(joint=6), "out_of_range", "joint"),
 ]
-FAST = points((2.0, bent(0, 0.1), REST, REST), (2.6, bent(0, 1.6), REST, REST))
+FAST = through((2.0, bent(0, 0.1), REST, REST), (2.6, bent(0, 1.6), REST, REST))
 TOO_GENTLE = m.ArcSegment(via=away((0.1, 0.0, 0.0)), pose=away((0.1, 0.1, 0.0)), acceleration=1e-3)
 PLANNED = [
     (m.MoveL, {"pose": away((5.0, 0.0, 0.0))}, "no_solution", "pose"),
@@ -198,22 +187,11 @@ PLANNED = [
     (m.MovePath, path(m.LineSegment(pose=away((9.0, 0.0, 0.0)))), "no_solution", "segments[0].pose"),
     (m.MovePath, path(m.JointSegment(q=Q1_), m.JointSegment(q=REST[1:])), "out_of_range", "segments[1].q"),
     (m.MovePath, path(m.JointSegment(q=(9.0,) * 6)), "limit_position", "segments[0].q[0]"),
-    (m.MoveTrajectory, points((0.0, bent(2, 0.02)), (1.0, bent(2, 0.0))), "out_of_range", "points[0].q[2]"),
-    (
-        m.MoveTrajectory,
-        points((1.0, bent(0, 0.1))),
-        "limit_acceleration",
-        "points[0]",
-        "or velocities if they have",
-    ),
-    (
-        m.MoveTrajectory,
-        points((5.0, bent(0, 0.1), REST), (15.0, bent(5, 6.0), REST)),
-        "limit_position",
-        "points[1]",
-    ),
-    (m.MoveTrajectory, FAST, "limit_velocity", "points[1]", "joint base would have a velocity of"),
-    (m.MoveTrajectory, points((3.0, bent(1, 1.0), REST)), "collision", "points[0]", "floor"),
+    (*through((0.0, bent(2, 0.02)), (1.0, bent(2, 0.0))), "out_of_range", "points[0].q[2]"),
+    (*through((1.0, bent(0, 0.1))), "limit_acceleration", "points[0]", "or velocities if they have"),
+    (*through((5.0, bent(0, 0.1), REST), (15.0, bent(5, 6.0), REST)), "limit_position", "points[1]"),
+    (*FAST, "limit_velocity", "points[1]", "joint base would have a velocity of"),
+    (*through((3.0, bent(1, 1.0), REST)), "collision", "points[0]", "floor"),
     (m.MovePath, {"segments": (TOO_GENTLE,)}, "out_of_range", "segments[0].acceleration"),
 ]
 WITH_TOKEN = [

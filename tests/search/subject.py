@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import msgspec
 import numpy as np
+from tests.controller.robots import NoArm
 
 from tvist_controller.api.line import (
     InverseDynamics,
@@ -22,7 +23,7 @@ from tvist_lab.identification.calibrate import mode_range
 from tvist_lab.recordings import Floats
 from tvist_plant.description import RobotDescription
 from tvist_plant.model import flexible_model
-from tvist_plant.plant import PERIOD, Measurement
+from tvist_plant.plant import PERIOD
 from tvist_protocol import commands as c
 from tvist_protocol.calibration import Calibration, ModalParameter, Quantity
 from tvist_protocol.info import Clock
@@ -36,25 +37,15 @@ _OF_DRIVES: tuple[Quantity, ...] = ("gear_stiffness", "rotor_inertia", "velocity
 _made: dict[str, Calibration] = {}
 
 
-class RigidArm:
+class RigidArm(NoArm):
     """A plant for tests of references only: it is always exactly at its target, and measures no forces."""
 
     def __init__(self, payload):
-        self._payload = payload
+        self.payload = payload
 
-    @property
-    def payload(self):
-        return self._payload
-
-    def step(self, command):
-        return Measurement(command.q, command.qd, np.zeros_like(command.q), np.zeros(3))
-
-    def reset(self, command, *, payload=None, seed=0):  # noqa: ARG002
-        self._payload = self._payload if payload is None else payload
+    def reset(self, command, *, payload=None, **_):
+        self.payload = self.payload if payload is None else payload
         return self.step(command)
-
-    def truth(self):
-        return None
 
 
 @dataclass

@@ -6,7 +6,6 @@ import select
 import shutil
 import signal
 import subprocess
-import threading
 import time
 from pathlib import Path
 
@@ -130,19 +129,14 @@ class Contained(Served):
 
     def __init__(self, engine, *options, command=()):
         self.engine, self.name = engine, f"robot-{time.monotonic_ns()}"
-        self.endpoint, self.lines = free_endpoint(), []
+        self.endpoint = free_endpoint()
         port = self.endpoint.rpartition(":")[2]
-        self._news = threading.Condition()
-        self.process = subprocess.Popen(
-            [
-                "podman", "run", f"--name={self.name}", "--health-interval=disable", "--read-only",
-                "--read-only-tmpfs=false", "--cap-drop=ALL", "--security-opt=no-new-privileges", "--network=tests",
-                f"--publish=127.0.0.1:{port}:7447", *options, "tvist", *command,
-            ],
-            stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, env=engine.environment,
-        )  # fmt: skip
-        self._reader = threading.Thread(target=self._read, daemon=True)
-        self._reader.start()
+        words = [
+            "podman", "run", f"--name={self.name}", "--health-interval=disable", "--read-only",
+            "--read-only-tmpfs=false", "--cap-drop=ALL", "--security-opt=no-new-privileges", "--network=tests",
+            f"--publish=127.0.0.1:{port}:7447", *options, "tvist", *command,
+        ]  # fmt: skip
+        self._begin(subprocess.Popen, words, engine.environment)
 
     @property
     def pid(self):

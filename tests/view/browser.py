@@ -2,9 +2,7 @@
 
 import os
 import re
-import subprocess
 import sys
-import threading
 from contextlib import contextmanager
 
 import pytest
@@ -40,16 +38,8 @@ class Page(Served):
     program = ("-m", "tvist_cli", "view")
 
     def __init__(self, *arguments):
-        self._news, self.lines = threading.Condition(), []
-        self.process = forked.Popen(
-            [sys.executable, *self.program, *map(str, arguments), "--port", "0"],
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            text=True,
-            env={**os.environ, "PYTHONUNBUFFERED": "1", "COLUMNS": "200"},
-        )
-        self._reader = threading.Thread(target=self._read, daemon=True)
-        self._reader.start()
+        words = [sys.executable, *self.program, *map(str, arguments), "--port", "0"]
+        self._begin(forked.Popen, words, {**os.environ, "PYTHONUNBUFFERED": "1", "COLUMNS": "200"})
 
     def wait_until_ready(self):
         self.wait_until_said("http://")
