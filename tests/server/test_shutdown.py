@@ -37,7 +37,7 @@ from tvist_server import clock, shutdown
 def on_and_on(*_):
     while True: pass
 clock.Lockstep.close = on_and_on
-shutdown.LONGEST = 2.0
+shutdown.LONGEST = 1.0
 sys.argv = ["tvist", "serve", "--clock", "lockstep", "--listen", "{}"]
 main()
 """
