@@ -32,6 +32,7 @@ pytestmark = [pytest.mark.acceptance, pytest.mark.realtime]
 DOMAIN = os.getpid() % 100 + 1
 NEAR = 0.01  # deviation of an arm that has arrived [rad]
 SECOND = 500  # number of states
+SERVICES = ("power_off", "brake_release", "pause")
 
 
 class Client:
@@ -46,6 +47,9 @@ class Client:
         self.positions = node.create_publisher(Float64MultiArray, POSITIONS, 10)
         self.trajectories = node.create_publisher(JointTrajectory, f"{CONTROLLER}/joint_trajectory", 10)
         self._action = ActionClient(node, FollowJointTrajectory, f"{CONTROLLER}/follow_joint_trajectory")
+        # A server waits only 0.1 s for a new client's end before it answers, so they all meet first.
+        self._services = {name: node.create_client(Trigger, f"dashboard_client/{name}") for name in SERVICES}
+        assert all(service.wait_for_service(60.0) for service in self._services.values())
         assert self._action.wait_for_server(60.0)
         while not (self.positions.get_subscription_count() and self.trajectories.get_subscription_count()):
             self.next_states(1)
@@ -70,9 +74,7 @@ class Client:
         return future.result()
 
     def call(self, service):
-        client = self._node.create_client(Trigger, f"dashboard_client/{service}")
-        assert client.wait_for_service(60.0)
-        return self.answer(client.call_async(Trigger.Request()))
+        return self.answer(self._services[service].call_async(Trigger.Request()))
 
     def send_goal(self, q, seconds, feedback=None):
         goal = FollowJointTrajectory.Goal(trajectory=trajectory_to(q, seconds))
