@@ -102,6 +102,14 @@ def compile_kernels():
         asyncio.run(move(shaper))
 
 
+@pytest.fixture(scope="session")
+def ur5e():
+    """The paper's arm, as its robot file describes it."""
+    from tvist_plant.description import load
+
+    return load("ur5e")
+
+
 @pytest.fixture
 def measured(request):
     """Record a figure with `measured(what, value)`; `pytest -v` shows it."""

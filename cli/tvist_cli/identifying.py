@@ -23,7 +23,7 @@ from tvist_lab.identification.payload import identify_payload
 from tvist_lab.identification.ring_downs import Log, Progress
 from tvist_lab.identification.twin import fit_twin
 from tvist_lab.identification.twin_file import twin_file
-from tvist_lab.in_process import free_setup, robot_in_process
+from tvist_lab.in_process import robot_in_process
 from tvist_lab.recordings import read
 from tvist_lab.served import ServedError, served_robot
 from tvist_lab.whole_file import write_whole
@@ -120,7 +120,7 @@ class MovableRobot:
                 "seed": seed,
             }
             with failing_on(ValueError, exit_code=2):
-                self._setup = free_setup(from_mapping(content, "options"))
+                self._setup = from_mapping(content, "options").setup()
                 check_rating(self._setup.payload, self._setup.description)
 
     def weigh(self, *, declare: bool, json: bool) -> None:

@@ -5,8 +5,6 @@ from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from itertools import pairwise
 
-from msgspec.structs import replace
-
 from tvist_client.robot import Robot
 from tvist_client.transports.loopback import LoopbackTransport
 from tvist_controller.api.line import Setup
@@ -14,24 +12,19 @@ from tvist_controller.api.robot import LoopbackHost
 from tvist_lab.collect import Collected, collect
 from tvist_plant.plant import PERIOD
 from tvist_protocol.info import Info
-from tvist_server.config import ServeConfig, from_mapping
+from tvist_server.config import from_mapping
 
 LEAD = 150  # ticks at rest before the first motion
 VELOCITY, ACCELERATION = 1.5, 2.0  # the paper's limits of the motions [rad/s, rad/s²]
 REST_S = 1.0  # time for the shaper's delay and the vibration after a motion [s]
 
 
-def free_setup(config: ServeConfig | None = None, **changes: object) -> Setup:
+def free_setup(**changes: object) -> Setup:
     """Return a setup with a free clock and published truth, by default of the default robot.
 
-    If `config` is given, its choice of `truth` is kept, but a clock `realtime` becomes `free`. `changes` are
-    fields of `ServeConfig`. Raises StartError if a change names no field or has an invalid value.
+    `changes` are fields of `ServeConfig`. Raises StartError if a change names no field or has an invalid value.
     """
-    if config is None:
-        return from_mapping({"clock": "free", "truth": True, **changes}, "setup").setup()
-    checked = from_mapping(changes, "setup")
-    timeless: dict[str, object] = {"clock": "free"} if config.clock == "realtime" else {}
-    return replace(config, **(timeless | {name: getattr(checked, name) for name in changes})).setup()
+    return from_mapping({"clock": "free", "truth": True, **changes}, "setup").setup()
 
 
 @asynccontextmanager

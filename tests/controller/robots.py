@@ -167,19 +167,29 @@ class Robot:
             self.events += events
         return self.states[-1] if self.states else None
 
-    def until_rest(self, most: int = 5000):
+    def until(self, wanted, most: int = 30_000):
+        """Tick until something is so; return the last state."""
         for _ in range(most):
             self.tick()
-            if self.controller.cycle.mode.at_rest:
+            if wanted():
                 return self.states[-1]
-        raise AssertionError("still moving")
+        raise AssertionError("it never was so")
 
-    def stream(self, ticks: int = 100, **limits):
-        """A stream of small set-points for some ticks, which goes on."""
+    def until_rest(self, most: int = 5000):
+        return self.until(lambda: self.controller.cycle.mode.at_rest, most)
+
+    def move(self, ticks: int = 200) -> int:
+        """Start a move to Q3 and let it run for some ticks; return its number."""
+        accepted = self.send(c.MoveJ, q=tuple(Q3))
+        self.tick(ticks)
+        return accepted.id
+
+    def stream(self, ticks: int = 100, swing=0.1, pace: float = 3.0, **limits):
+        """A stream of set-points that swing to one side for some ticks, which goes on."""
         assert self.send(c.ServoStart, **limits) == Done()
         start = self.controller.cycle.sample.reference
         for k in range(ticks):
-            self.setpoint(k, start + 0.1 * (1 - np.cos(3.0 * k * H)))
+            self.setpoint(k, start + swing * (1 - np.cos(pace * k * H)))
             self.tick()
 
     def kinds(self):
@@ -187,6 +197,10 @@ class Robot:
 
     def told(self, kind):
         return [event for event in self.events if event.kind == kind]
+
+    def motions(self):
+        """Return starts and ends of motions."""
+        return [kind for kind in self.kinds() if kind.startswith("motion_")]
 
     def warnings(self):
         return [event.why for event in self.told("warning")]

@@ -28,11 +28,8 @@ def playing(robot: Robot) -> bool:
 
 def finish(robot: Robot, most: int = 20_000) -> Robot:
     """Tick until the program has ended or is paused."""
-    for _ in range(most):
-        robot.tick()
-        if not playing(robot):
-            return robot
-    raise AssertionError("the program goes on")
+    robot.until(lambda: not playing(robot), most)
+    return robot
 
 
 def run(robot: Robot, *lines: str) -> Robot:

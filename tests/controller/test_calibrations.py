@@ -15,7 +15,7 @@ from tvist_protocol import commands as c
 from tvist_protocol.replies import Done
 from tvist_shaping.errors import EstimatorError
 
-from .robots import Q3, UR5E, H, Robot
+from .robots import Q3, UR5E, Robot
 
 SHIPPED = [load_robot(name) for name in robots()]
 SOFT = changed(UR5E, "drives", gear_stiffness=tuple(0.5 * k for k in UR5E.drives.gear_stiffness))
@@ -137,10 +137,7 @@ def test_auto_target_arrives_sooner_than_auto_and_still_follows_streams():
         assert robot.states[-1].estimated_f_d[0] == pytest.approx(14.8, abs=1.0)
     assert ticks["auto-target"] < ticks["auto"]
     at_rest = robot.controller.cycle.tvist.f_d.copy()
-    robot.send(c.ServoStart)
-    for k in range(400):
-        robot.setpoint(k, Q3 - 0.2 * (1.0 - np.cos(2.0 * k * H)) * np.array([0, 1, 1, 0, 0, 0]))
-        robot.tick()
+    robot.stream(400, -0.2 * np.array([0, 1, 1, 0, 0, 0]), 2.0)
     assert abs(robot.states[-1].estimated_f_d[0] - at_rest[0]) > 0.02  # it follows the arm
 
 

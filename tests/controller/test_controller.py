@@ -22,13 +22,6 @@ Q1_, Q2_, Q3_ = tuple(Q1), tuple(Q2), tuple(Q3)
 DISC = paper_payload(UR5E)
 
 
-def moving(robot: Robot, ticks: int = 200) -> int:
-    """Start a move and let it run for some ticks; return its number."""
-    accepted = robot.send(c.MoveJ, q=Q3_)
-    robot.tick(ticks)
-    return accepted.id
-
-
 def test_a_motion_starts_at_the_next_tick_and_is_done_at_rest(robot):
     assert robot.send(c.MoveJ, q=Q2_) == Accepted(id=1)
     last = robot.until_rest()
@@ -38,7 +31,7 @@ def test_a_motion_starts_at_the_next_tick_and_is_done_at_rest(robot):
 
 
 def test_a_stop_reports_a_limited_deceleration(robot):
-    moving(robot)
+    robot.move()
     robot.send(c.Stop, deceleration=1e5)
     robot.tick()
     assert "limited" in robot.events[-1].why
@@ -95,7 +88,7 @@ def test_a_calibration_for_another_payload_causes_a_warning():
 
 def test_a_reset_in_motion_stops_it_and_restores_the_initial_state():
     robot, fresh = Robot(), Robot(q=Q3_, seed=5)
-    motion = moving(robot)
+    motion = robot.move()
     robot.send(SimulationReset, q=Q3_, seed=5)
     robot.states.clear()
     for each in (robot, fresh):
@@ -112,7 +105,7 @@ def test_a_reset_in_motion_stops_it_and_restores_the_initial_state():
 
 def test_an_expired_lease_stops_a_moving_arm():
     robot = Robot(clock="realtime", lease_s=1.0)
-    motion = moving(robot, 501)
+    motion = robot.move(501)
     told = [(event.kind, event.id, event.tick) for event in robot.events[1:]]
     assert told == [("lease_lost", None, 501), ("motion_stopped", motion, 501)]
     robot.until_rest()

@@ -96,10 +96,7 @@ def joints(robot):
 
 
 def stream(robot):
-    robot.send(c.ServoStart)
-    for number in range(300):
-        robot.setpoint(number, Q1 + 0.05 * np.sin(0.02 * number) ** 2)
-        robot.tick()
+    robot.stream(300, 0.025, 20.0)
     robot.send(c.ServoStop)
 
 

@@ -61,17 +61,10 @@ def random_spherical(rng):
     return arm(a, d, (signs[0], straight, *signs[1:], rng.uniform(-np.pi, np.pi)))
 
 
-PUMA = arm(
-    (0.0, 0.43, -0.02, 0.0, 0.0, 0.0),
-    (0.67, 0.0, 0.15, 0.43, 0.0, 0.06),
-    (RIGHT, 0.0, -RIGHT, RIGHT, -RIGHT, 0.0),
-)
-CENTRED = arm(
-    (0.0, 0.4, 0.0, 0.0, 0.0, 0.0), (0.3, 0.0, 0.0, 0.4, 0.0, 0.1), (RIGHT, 0.0, -RIGHT, RIGHT, -RIGHT, 0.0)
-)
-LONG = arm(
-    (0.0, 0.5, 0.0, 0.0, 0.0, 0.0), (0.3, 0.0, 0.0, 0.4, 0.0, 0.1), (RIGHT, 0.0, -RIGHT, RIGHT, -RIGHT, 0.0)
-)
+SPHERICAL = (RIGHT, 0.0, -RIGHT, RIGHT, -RIGHT, 0.0)
+PUMA = arm((0.0, 0.43, -0.02, 0.0, 0.0, 0.0), (0.67, 0.0, 0.15, 0.43, 0.0, 0.06), SPHERICAL)
+CENTRED = arm((0.0, 0.4, 0.0, 0.0, 0.0, 0.0), (0.3, 0.0, 0.0, 0.4, 0.0, 0.1), SPHERICAL)
+LONG = arm((0.0, 0.5, 0.0, 0.0, 0.0, 0.0), (0.3, 0.0, 0.0, 0.4, 0.0, 0.1), SPHERICAL)
 EVEN_UR = arm(
     (0.0, -0.4, -0.4, 0.0, 0.0, 0.0), (0.2, 0.1, -0.3, 0.2, 0.1, 0.1), (RIGHT, 0.0, 0.0, RIGHT, -RIGHT, 0.0)
 )

@@ -152,7 +152,7 @@ def test_an_arm_with_unknown_position_cannot_start():
         Controller(setup(), plant)
 
 
-def fails():
+def fails(*_):
     raise PlantError("no answer")
 
 
@@ -231,10 +231,7 @@ def test_a_simulated_arm_that_keeps_failing_stays_without_power():
     robot = Robot(plant=plant)
     robot.tick(10)
 
-    def step(_):
-        raise PlantError("the glass is broken")
-
-    plant.step = step
+    plant.step = fails
     robot.tick(20)
     assert modes(robot) == FAILED
     assert [event.kind for event in robot.events if event.code == "plant_failure"] == ["safety_stop"]
@@ -403,14 +400,10 @@ def test_after_a_stop_by_the_arm_controller_nothing_is_sent_until_the_line_resta
     assert stands == pytest.approx(arm.q, abs=1e-12)
 
 
-def test_a_lease_expires_while_the_arm_controller_does_not_answer(arm, monkeypatch):
+def test_a_lease_expires_while_the_arm_controller_does_not_answer(arm):
     robot = Robot(plant=arm, clock="realtime", lease_s=0.2)
     robot.tick(5)
-
-    def silent():
-        raise PlantError("no answer")
-
-    monkeypatch.setattr(arm, "latest_report", silent)
+    arm.latest_report = fails
     robot.tick(200)
     assert robot.controller.session.lease is None
     assert "lease_lost" in [event.kind for event in robot.events]

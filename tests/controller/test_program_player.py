@@ -7,17 +7,12 @@ from tvist_protocol.programs import ProgramLoad, ProgramPause, ProgramPlay, Prog
 from tvist_protocol.replies import Done
 from tvist_protocol.simulation import SimulationInject, SimulationReset
 
-from .robots import Q1, Q2, Q3, Robot
+from .robots import Q1, Q2, Q3
 
 ALL = [q.tolist() for q in (Q1, Q2, Q3, Q2, Q1)]
 """Where the program `paper.urp` goes."""
 LONG = 300
 """Ticks in which a line would begin and a stop ends."""
-
-
-@pytest.fixture
-def robot():
-    return Robot(shaper="zv")
 
 
 def play(robot, name):
@@ -30,21 +25,8 @@ def state(robot):
     return io.program, io.program_state, io.program_line
 
 
-def until(robot, wanted, ticks=30_000):
-    for _ in range(ticks):
-        robot.tick()
-        if wanted():
-            return
-    raise AssertionError("it never was so")
-
-
 def stopped(robot):
     return lambda: state(robot)[1] == "STOPPED"
-
-
-def moves(robot):
-    """Return starts and ends of motions."""
-    return [event.kind for event in robot.events if event.kind.startswith("motion_")]
 
 
 def reached(robot):
@@ -56,7 +38,7 @@ def reached(robot):
 def test_a_program_makes_its_moves_in_order_without_gaps(robot):
     play(robot, "paper.urp")
     assert state(robot) == ("paper.urp", "PLAYING", 1)
-    until(robot, stopped(robot))
+    robot.until(stopped(robot))
     assert reached(robot) == ALL
     assert state(robot) == ("paper.urp", "STOPPED", 0)
     done = [event.tick for event in robot.told("motion_done")]
@@ -83,7 +65,7 @@ def test_playing_and_pausing_need_control_loading_and_stopping_do_not(robot):
     assert receive(ProgramStop()) == Done()
     assert state(robot)[1] == "STOPPED"
     robot.until_rest()
-    assert moves(robot)[-1] == "motion_stopped"
+    assert robot.motions()[-1] == "motion_stopped"
 
 
 @pytest.mark.parametrize(("name", "ticks"), [("paper.urp", 700), ("wait_program.urp", 10)])
@@ -108,19 +90,19 @@ def test_no_line_starts_after_an_earlier_stop(robot):
     play(robot, "paper.urp")
     assert robot.controller.receive(c.Stop()) == Done()  # before the tick in which the first line would begin
     robot.tick(10)
-    assert moves(robot) == []
+    assert robot.motions() == []
     robot.send(ProgramPlay)
-    until(robot, lambda: len(reached(robot)) == 1)
+    robot.until(lambda: len(reached(robot)) == 1)
     robot.send(c.Stop)  # between two lines
     robot.tick(10)
     assert state(robot) == ("paper.urp", "STOPPED", 0)
-    assert moves(robot) == ["motion_started", "motion_done"]
+    assert robot.motions() == ["motion_started", "motion_done"]
 
 
 @pytest.mark.parametrize("fault", ["protective_stop", "nan"])
 def test_a_program_resumes_the_interrupted_line_after_a_protective_stop(robot, fault):
     play(robot, "paper.urp")
-    until(robot, lambda: len(reached(robot)) == 1)
+    robot.until(lambda: len(reached(robot)) == 1)
     robot.tick(300)
     robot.send(SimulationInject, fault=fault)
     robot.tick(LONG)
@@ -131,7 +113,7 @@ def test_a_program_resumes_the_interrupted_line_after_a_protective_stop(robot, f
     robot.tick(LONG)
     assert state(robot) == ("paper.urp", "PAUSED", 3)
     assert robot.send(ProgramPlay) == Done()
-    until(robot, stopped(robot))
+    robot.until(stopped(robot))
     assert reached(robot) == ALL
 
 
@@ -147,19 +129,19 @@ def test_pause_holds_the_motion_and_play_resumes_it(robot):
     assert robot.send(ProgramPause).code == "wrong_mode"
     assert robot.send(ProgramPlay) == Done()
     assert robot.send(ProgramPlay).code == "busy"
-    until(robot, stopped(robot))
+    robot.until(stopped(robot))
     assert reached(robot) == [Q2.tolist()]
 
 
 def test_a_safeguard_stop_between_two_lines_delays_the_next_one(robot):
     play(robot, "paper.urp")
-    until(robot, lambda: len(reached(robot)) == 1)
+    robot.until(lambda: len(reached(robot)) == 1)
     robot.send(SimulationInject, fault="safeguard_stop")
     robot.tick(100)
     assert state(robot)[1] == "PLAYING"
-    assert moves(robot) == ["motion_started", "motion_done"]
+    assert robot.motions() == ["motion_started", "motion_done"]
     robot.send(SimulationInject, fault="normal")
-    until(robot, stopped(robot))
+    robot.until(stopped(robot))
     assert reached(robot) == ALL
 
 

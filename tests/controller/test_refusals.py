@@ -35,11 +35,6 @@ IMPOSSIBLE = (1.0, 0.9, 0.0, 1.0, 0.0, 1.0)
 HEAVY = Payload(mass=6.0, com=(0.0, 0.0, 0.04), inertia=IMPOSSIBLE)
 
 
-def moving(robot):
-    robot.send(c.MoveJ, q=Q3_)
-    robot.tick(200)
-
-
 def assert_unchanged(robot: Robot, twin: Robot, ticks: int = 50) -> None:
     """Check that the next states and events equal, bit for bit, those of a robot without the command."""
     for each in (robot, twin):
@@ -214,7 +209,7 @@ def assert_refused(robot, twin, table):
     assert_unchanged(robot, twin)
 
 
-@pytest.mark.parametrize("begin", [Robot.tick, moving, Robot.stream])
+@pytest.mark.parametrize("begin", [Robot.tick, Robot.move, Robot.stream])
 def test_invalid_commands_are_refused_and_change_nothing(begin):
     """Content is checked before the present activity."""
     assert_refused(*alike(begin), WRONG)
@@ -225,7 +220,7 @@ def test_impossible_paths_are_refused_and_change_nothing():
 
 
 def test_a_stale_token_is_refused_before_other_checks():
-    robot, twin = alike(moving)
+    robot, twin = alike(Robot.move)
     wrong = [
         (kind, fields) for kind, fields, *_ in WRONG if kind is not c.TakeControl and "token" not in fields
     ]

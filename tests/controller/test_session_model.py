@@ -489,12 +489,12 @@ class Sessions(RuleBasedStateMachine):
             assert [state.actual_q for state in again.states] == [q.actual_q for q in self.sink.states]
 
 
-FULL = pytest.mark.parametrize(
+@pytest.mark.parametrize("clock", ["realtime", "lockstep"])
+@pytest.mark.parametrize(
     "full", [False, pytest.param(True, marks=[pytest.mark.nightly, pytest.mark.timeout(3600)])]
 )
-
-
-def check(clock, full):
+def test_random_sessions_match_the_model(clock, full):
+    """The clocks lockstep and free are one to the controller."""
     runs = settings(
         max_examples=share(100 if full else 50),
         stateful_step_count=40 if full else 25,
@@ -502,14 +502,3 @@ def check(clock, full):
         derandomize=not full,
     )
     run_state_machine_as_test(partial(Sessions, clock), settings=runs)
-
-
-@FULL
-def test_random_sessions_match_the_model_in_real_time(full):
-    check("realtime", full)
-
-
-@FULL
-def test_random_sessions_match_the_model_with_stepped_time(full):
-    """The clocks lockstep and free are one to the controller."""
-    check("lockstep", full)

@@ -142,12 +142,9 @@ def test_a_stop_causes_no_torque_overload(seed):
     robot = Robot(seed=seed)
     if seed % 2:
         robot.send(SimulationReset, q=tuple(Q3))
-    start = np.array(robot.tick().target_q)
-    robot.send(c.ServoStart)
+    robot.tick()
     swing, pace = random.uniform(-0.3, 0.3, 6), random.uniform(1.5, 3.0)
-    for k in range(int(random.integers(200, 600))):
-        robot.setpoint(k, start + swing * (1.0 - np.cos(pace * k * H)))
-        robot.tick()
+    robot.stream(int(random.integers(200, 600)), swing, pace)
     robot.send(c.Stop)
     robot.tick(300)
     assert "protective_stop" not in robot.kinds()

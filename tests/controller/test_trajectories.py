@@ -65,10 +65,6 @@ def fault(points, q):
     return code, next(n for n, point in enumerate(points) if point.time > time - 1e-9 or point is points[-1])
 
 
-def motions(robot):
-    return [kind for kind in robot.kinds() if kind.startswith("motion")]
-
-
 @pytest.mark.parametrize("count", [9, pytest.param(200, marks=pytest.mark.nightly)])
 def test_a_trajectory_is_tracked_as_scipy_interpolates_it_or_refused_at_its_first_bad_point(count):
     robot, outcomes = Robot(plant=NoArm(), q=tuple(BENT)), []
@@ -87,7 +83,7 @@ def test_a_trajectory_is_tracked_as_scipy_interpolates_it_or_refused_at_its_firs
             times = np.arange(1, len(robot.states) + 1) * H
             assert np.abs(robot.column("reference_q") - curve(points, BENT, times)).max() <= 1e-9, number
             assert last.target_q == pytest.approx(points[-1].q, abs=1e-6)
-            assert motions(robot) == ["motion_started", "motion_done"]
+            assert robot.motions() == ["motion_started", "motion_done"]
             continue
         if reply.code in {"collision", "limit_torque"}:  # the oracle does not know these
             named = int(reply.where[len("points[") : -1])
@@ -97,7 +93,7 @@ def test_a_trajectory_is_tracked_as_scipy_interpolates_it_or_refused_at_its_firs
         assert reply.why.startswith(f"{reply.where}: ")
         robot.tick(3)
         assert (robot.column("reference_q") == BENT).all()
-        assert not motions(robot)
+        assert not robot.motions()
         assert isinstance(robot.send(c.MoveJ, q=tuple(BENT + 0.01)), Accepted)
     assert outcomes.count("accepted") >= 0.6 * count
     assert count < 200 or len(set(outcomes)) > 3
@@ -263,7 +259,7 @@ def test_slider_pause_and_resume_keep_the_reference_on_its_curve(shaper):
     assert reached[-1] == pytest.approx(len(way) - 1, abs=0.1)
     hardest = np.abs(np.diff(way, 2, axis=0)).max() / H**2
     assert np.abs(robot.column("target_qdd")).max() <= 1.005 * max(hardest, 2.0)
-    assert motions(robot) == ["motion_started", "motion_done"]
+    assert robot.motions() == ["motion_started", "motion_done"]
 
 
 @pytest.mark.parametrize("seconds", [2.0, 30.0])
@@ -293,7 +289,7 @@ def test_payload_and_shaper_change_at_any_tick_of_the_shaped_end_of_a_trajectory
         assert robot.send(c.SetPayload, **weight) == Done()
         assert robot.send(c.SetShaper, name="um_zv") == Done()
     robot.until_rest()
-    assert motions(robot) == ["motion_started", "motion_done"]
+    assert robot.motions() == ["motion_started", "motion_done"]
 
 
 def test_a_replay_of_a_stopped_trajectory_is_bit_equal():

@@ -10,7 +10,6 @@ from tvist_controller.api.line import InverseDynamics, JointLine, body, quickest
 from tvist_controller.sources import calibrations
 from tvist_lab.metrics import motions
 from tvist_lab.recordings import STATE_COLUMNS, Recording
-from tvist_plant.description import load
 
 PERIOD = 0.002
 JOINTS = 6
@@ -31,11 +30,6 @@ def torques_along(arm, payload, start, end, limits):
     qd = np.gradient(q, PERIOD, axis=0)
     weight = dynamics.gravities(q)
     return weight, dynamics.torques(q, qd, np.gradient(qd, PERIOD, axis=0)) - weight
-
-
-@pytest.fixture(scope="session")
-def ur5e():
-    return load("ur5e")
 
 
 @pytest.fixture(scope="session")

@@ -49,10 +49,10 @@ def foreign(path, messages, encoding="json", metadata=None, name="tvist"):
     return path
 
 
-def record(path, messages, *, finish=True, dropped=None):
+def record(path, messages, *, info=INFO, start=START, finish=True, dropped=None):
     """Write messages as the server does."""
     with path.open("wb") as stream:
-        writer = RecordingWriter(stream, topics(INFO.name), heading(INFO, START))
+        writer = RecordingWriter(stream, topics(info.name), heading(info, start))
         for message in messages:
             writer.write(message)
         if finish:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 from scipy.spatial.transform import Rotation
+from tests.lab.golden import record
 
 from tvist_cli.commands.log.export import export as export_command
 from tvist_controller.about import info_of
@@ -18,9 +19,7 @@ from tvist_lab.recordings import RecordingError
 from tvist_lab.recordings.export import written_by
 from tvist_lab.recordings.mcap_file import read
 from tvist_protocol import MoveJ, TakeControl
-from tvist_protocol.recorded import topics
 from tvist_protocol.replies import Accepted
-from tvist_server.recording.writer import RecordingWriter, heading
 
 SEVEN = Path(__file__).parents[1] / "plant" / "urdf" / "seven.urdf"
 TICKS = 240
@@ -30,20 +29,15 @@ def recorded(path, *, robot="ur5e", truth=True, start=True):
     """A short motion, recorded as by a server, or as by a client without its start."""
     own = {"calibration": "none", "shaper": "none"} if robot == SEVEN else {}
     setup = free_setup(robot=str(robot), truth=truth, **own)
-    controller = Controller(setup)
+    controller, told = Controller(setup), []
     info = info_of(controller)
-    with path.open("wb") as stream:
-        begin = heading(info, setup.to_builtins() if start else {})
-        writer = RecordingWriter(stream, topics(info.name), begin)
-        token = controller.receive(TakeControl(client="test", lease_s=30.0)).token
-        there = [angle + 0.2 for angle in setup.q]
-        assert isinstance(controller.receive(MoveJ(token=token, q=there)), Accepted)
-        for _ in range(TICKS):
-            state, events = controller.tick()
-            for message in (*events, state, *([controller.truth()] if truth else [])):
-                writer.write(message)
-        writer.finish({})
-    return path
+    token = controller.receive(TakeControl(client="test", lease_s=30.0)).token
+    there = [angle + 0.2 for angle in setup.q]
+    assert isinstance(controller.receive(MoveJ(token=token, q=there)), Accepted)
+    for _ in range(TICKS):
+        state, events = controller.tick()
+        told += [*events, state, *([controller.truth()] if truth else [])]
+    return record(path, told, info=info, start=setup.to_builtins() if start else {})
 
 
 def messages(path):

@@ -7,22 +7,15 @@ import jsonschema
 import msgspec
 import pytest
 from mcap.reader import make_reader
+from tests.lab.golden import INFO, STATE, TRUTH
 
-from tvist_protocol import Event, Info, MoveJ, Setpoint, State, Truth
-from tvist_protocol.generate import FOLDER
+from tvist_protocol import Event, Info, MoveJ, Setpoint
 from tvist_protocol.journal import Entry, entry_of
 from tvist_protocol.recorded import topics
 from tvist_server.recording.writer import RecordingWriter, heading
 
 KINDS = ("state", "event", "truth", "io", "journal")
 START = {"seed": 3, "q": [0.1 + 0.2, -0.0], "nested": {"b": 1, "a": None}}
-
-
-def golden(name, kind):
-    return msgspec.json.decode((FOLDER / "fixtures" / "v1" / f"{name}.json").read_bytes(), type=kind)
-
-
-INFO, STATE, TRUTH = golden("info", Info), golden("state", State), golden("truth", Truth)
 
 
 def session(ticks):
