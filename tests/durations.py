@@ -89,7 +89,7 @@ class Durations:
 
     def pytest_sessionfinish(self):
         machine = {
-            "date": f"{datetime.now(UTC):%Y-%m-%d}", "cpus": os.cpu_count(), "machine": platform.machine(),
+            "date": f"{datetime.now(UTC):%Y-%m-%d}", "cpus": os.cpu_count(), "machine": platform.machine(),  # noqa: TID251  a date is meant
             "python": platform.python_version(), "clocked": round(self.clocked, 1),
         }  # fmt: skip
         lines = (

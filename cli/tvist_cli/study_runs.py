@@ -114,7 +114,7 @@ def _ran(
     except ChildProcessError as error:
         raise ChildProcessError(f"{error}; some moves are done: {kept}") from error
     about = {
-        "date": datetime.now(UTC).date().isoformat(),
+        "date": datetime.now(UTC).date().isoformat(),  # noqa: TID251  a date is meant
         "rows": len(ran.rows),
         "failed": int((ran.rows["status"] == FAILED).sum()),
         "too_weak": int((ran.rows["status"] == TOO_WEAK).sum()),
