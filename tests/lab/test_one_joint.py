@@ -9,7 +9,7 @@ import pytest
 from msgspec.structs import replace
 
 from tvist_controller.api.line import body, estimator_of, load_calibration, paper_payload
-from tvist_lab.one_joint import ANGLES, MASSES, FlexibleShoulder, pluck, pluck_all
+from tvist_lab.one_joint import ANGLES, FlexibleShoulder, pluck_all
 from tvist_plant.description import load
 from tvist_plant.flexible_arm import FlexibleArm
 from tvist_plant.model import rigid_model
@@ -29,15 +29,6 @@ def test_inertia_equals_that_of_the_mass_matrix():
     for q in np.random.default_rng(0).uniform(-math.pi, math.pi, (20, 2)):
         M = pin.crba(model, model.createData(), q)
         assert formula.inertia(q[1]) == pytest.approx(M[0, 0], rel=1e-12)
-
-
-@pytest.mark.parametrize("mass", MASSES)
-def test_simulated_frequencies_agree_with_the_formula(mass):
-    """Fitted to the accelerometer, noise and friction included."""
-    payload = disc(mass)
-    formula = FlexibleShoulder.of(ARM, payload)
-    for elbow in ANGLES[::3]:
-        assert pluck(ARM, payload, elbow).f_d == pytest.approx(formula.mode(elbow)[0], rel=0.005)
 
 
 def test_lowest_true_mode_agrees_with_the_formula():
@@ -77,6 +68,7 @@ def test_arm_without_vertical_axes_has_no_formula():
 
 def test_page_has_the_computed_values():
     done = pluck_all()
+    assert done.worst("f_d") < 0.5
     assert [round(math.degrees(one.elbow)) for one in done.poses] == [30, 90, 150]
     found = PAGE.read_text(encoding="utf-8")
     for one in done.poses:

@@ -16,7 +16,7 @@ from tvist_lab.metrics import amplitude, motions, tool_acceleration
 from tvist_lab.programs.judging import BaselineError, broken, changes, read_baseline
 from tvist_lab.programs.limits import RunLimits
 from tvist_lab.programs.results import as_dict, junit, largest_peak
-from tvist_lab.programs.running import InputError, run_in_lockstep
+from tvist_lab.programs.running import run_in_lockstep
 from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import replay_file
 from tvist_protocol.errors import RefusedError
@@ -82,24 +82,6 @@ def test_inputs_are_set_from_the_first_tick():
         ),
     )  # fmt: skip
     assert [one.text for one in watch.said] == ["-7", "0.5", "True", "True"]
-
-
-@pytest.mark.parametrize(
-    ("wrong", "word"),
-    [
-        ("speed=3", "NAME=VALUE"),
-        ("input_int_register_3", "NAME=VALUE"),
-        ("input_int_register_3=3000000000", "2147483647"),
-        ("input_double_register_3=nan", "NaN"),
-        ("input_bit_register_3=2", "0 or 1"),
-        ("input_bit_register_200=1", "at most 127"),
-        ("digital_input_18=1", "0 to 17"),
-    ],
-)
-def test_wrong_input_is_refused(wrong, word):
-    with pytest.raises(InputError, match=word) as refused:
-        run("sleep(0.1)", inputs=(wrong,))
-    assert repr(wrong) in str(refused.value)
 
 
 def test_moves_have_durations_and_are_marked_if_stopped():

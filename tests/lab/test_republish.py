@@ -6,17 +6,13 @@ from itertools import islice
 import pytest
 from tests.lab.golden import INFO, IO, STATE, TRUTH, changed, record
 
-from tvist_cli.commands.log.replay import replay
-from tvist_cli.failure import Failure
 from tvist_lab import republish
 from tvist_lab.recordings import RecordingError
 from tvist_lab.recordings.mcap_file import read
-from tvist_lab.republish import Playback, PlaybackIntake, played
+from tvist_lab.republish import Playback, played
 from tvist_protocol import Event, Info, State
 from tvist_protocol.codec import decode, encode
-from tvist_protocol.commands import TakeControl
 from tvist_protocol.journal import Entry
-from tvist_protocol.replies import Refused
 
 MESSAGES = [
     changed(IO, tick=4),
@@ -96,35 +92,8 @@ def test_info_has_the_name_and_the_present_tick(path, network):
     assert info.limits == INFO.limits
 
 
-@pytest.mark.parametrize("data", [encode(TakeControl(client="a")), b"nonsense"])
-def test_playback_refuses_commands(data):
-    desk, answers = PlaybackIntake(INFO, "ghost"), []
-    desk.request(data, answers.append)
-    (refused,) = answers
-    assert isinstance(refused, Refused)
-    assert refused.code == "wrong_mode"
-    assert "takes no commands" in refused.why
-    assert desk.holder() is None
-
-
 def test_recording_without_description_is_refused(path):
     content = read(path)
     object.__setattr__(content, "info", None)
     with pytest.raises(RecordingError, match=r"run\.mcap does not describe its robot"):
         Playback(content, ["tcp/127.0.0.1:1"])
-
-
-@pytest.mark.parametrize(
-    ("options", "says"),
-    [
-        ({"speed": 2.0}, "--speed needs --publish"),
-        ({"loop": True}, "--loop needs --publish"),
-        ({"publish": True, "speed": 0.0}, "speed is 0: must be 0.01 to 100"),
-        ({"publish": True, "shaper": ["a.py:b"]}, "leave out --shaper"),
-        ({"publish": True, "output": "a.mcap"}, "leave out the output"),
-    ],
-)
-def test_incompatible_options_are_refused(path, options, says):
-    with pytest.raises(Failure, match=says) as failure:
-        replay(path, **options)
-    assert failure.value.code == 2

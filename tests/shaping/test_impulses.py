@@ -42,17 +42,12 @@ def test_amplitudes_and_times_match_the_golden_values(golden):
 
 
 @given(shapers, frequencies, shares)
-def test_every_shaper_gives_valid_impulses_with_sum_one(shaper, f_d, share):
+def test_every_shaper_gives_valid_impulses_within_its_catalogue_duration(shaper, f_d, share):
     impulses = shaper.function(f_d, share * shaper.zeta_max)
     checked = Impulses(impulses.A, impulses.tau)
     assert abs(checked.A.sum() - 1.0) < 1e-14
     assert np.abs(checked.A).sum() <= shaper.peak + 1e-12
-
-
-@given(shapers, st.floats(1.0, 100.0), shares)
-def test_no_shaper_lasts_longer_than_its_catalogue_duration(shaper, f_d, share):
-    longest = shaper.duration_periods / f_d * (1 + 1e-8)
-    assert shaper.function(f_d, share * shaper.zeta_max).duration <= longest
+    assert impulses.duration <= shaper.duration_periods / f_d * (1 + 1e-8)
 
 
 @pytest.mark.parametrize("name", SHAPERS)

@@ -53,6 +53,7 @@ def called(monkeypatch, capfd, tmp_path):
     """Return a function that runs `tvist` in this process; it returns an `Ended`."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(signal, "signal", lambda *_: None)  # this process keeps its handlers
+    monkeypatch.setattr("os.nice", lambda _: None)  # and its priority
 
     def run(*arguments):
         monkeypatch.setattr(sys, "argv", ["tvist", *map(str, arguments)])

@@ -76,6 +76,11 @@ MISUSE = [
     (("log", "record", "x.mcap", "--keep", "10"), ["keep is '10'", "90s, 10min or 2h"]),
     (("serve", "--record", "x.mcap", "--keep", "0s"), ["keep is '0s'", "from 1s"]),
     (("serve", "--keep", "10min"), ["keep is 10min", "nothing is recorded"]),
+    (("log", "replay", "x.mcap", "--speed", "2"), ["--speed needs --publish"]),
+    (("log", "replay", "x.mcap", "--loop"), ["--loop needs --publish"]),
+    (("log", "replay", "x.mcap", "--publish", "--speed", "0"), ["speed is 0: must be 0.01 to 100"]),
+    (("log", "replay", "x.mcap", "--publish", "--shaper", "a.py:b"), ["leave out --shaper"]),
+    (("log", "replay", "x.mcap", "again.mcap", "--publish"), ["leave out the output"]),
     (("log", "export", "x.mcap", "--to", "xls"), ["to is 'xls'", "csv, parquet, foxglove"]),
     (("log", "export", "x.mcap"), ["--to is missing"]),
     (("log", "export", "x.mcap", "--to", "foxglove", "--imu", "i.csv"), ["--imu", "needs a recording"]),
@@ -152,6 +157,11 @@ MISUSE = [
     (("serve", "--enable-motion"), ["--plant ur://"]),
     (("serve", "--plant", "ur://127.0.0.1:1", "--enable-motion", "--speed-cap", "9"), ["speed_cap is 9"]),
     (("serve", "--ur-port", "rtdee=30004"), ["rtdee"]),
+    (("view", "--compare", "none"), ["compare has 1 shapers: give two or three"]),
+    (("view", "--compare", "none", "--compare", "nope"), ["nope"]),
+    (("view", "--magnify", "0.5"), ["magnify is 0.5: must be 1 to 300"]),
+    (("view", "--magnify", "nan"), ["magnify"]),
+    (("view", "--html", "x.html"), ["needs a recording or --compare"]),
     (("serve", "--ur-address", "192.168.0.1"), ["--insecure"]),
     # files
     (("serve", "--config", "nope.toml"), ["nope.toml", "No such file"]),
@@ -159,7 +169,7 @@ MISUSE = [
 ]  # fmt: skip
 
 
-STUDIES = {"study", "demo", "identify", "robots", "shapers", "bench"}
+STUDIES = {"study", "demo", "identify", "robots", "shapers", "bench", "view"}
 """Commands that import the laboratory."""
 OF_STUDIES = [case for case in MISUSE if case[0][0] in STUDIES]
 OF_ROBOTS = [case for case in MISUSE if case not in OF_STUDIES]
@@ -199,9 +209,13 @@ def test_misuse_of_studies_prints_one_message_and_exits_with_code_2(called, argu
         (("serve", "--ur-address", "203.0.113.7", "--insecure"), ["does not have this address"]),
         (("serve", "--insecure", "--listen", "tcp/192.0.2.1:7447"), ["tcp/192.0.2.1:7447"]),
         (("identify", "--ring-downs", "3"), ["at least 4"]),
+        (("identify", "--ring-downs", "5", "--payload", "0,1,2,3,4,5"), ["at least 6"]),
         (("identify", "--robot", "one-joint", "--payload"), ["no joint of a one-joint arm carries weight"]),
         (("serve", "--record", "nope/x.mcap"), ["nope/x.mcap", "No such file"]),
         (("shapers", "--figures", __file__), [__file__, "no folder", "another name"]),
+        (("view", "missing.mcap"), ["missing.mcap"]),
+        (("view", "--address", "0.0.0.0"), ["--insecure"]),  # noqa: S104
+        (("view", "--port", "70000"), ["port is 70000: must be 0 to 65535"]),
         (("keys", __file__, "--robot", "ur5e", "--host", "x"), [__file__, "no folder", "another name"]),
     ],
     ids=name_of,

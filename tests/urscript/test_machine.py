@@ -232,15 +232,6 @@ def test_list_operations_of_one_statement_are_limited():
     assert robot.machine.left >= -2 * OVERDRAFT
 
 
-def test_a_waiting_thread_leaves_its_critical_section_to_others():
-    robot = Robot(
-        "thread t():\n enter_critical\n say(2)\n exit_critical\nend\nenter_critical\nrun t()\ni = 0\n"
-        "while i < 100:\n i = i + 1\nend\nsay(1)\nsync()\nsay(3)\nexit_critical"
-    )
-    robot.ticks(20, budget=100)
-    assert robot.said == ["1", "2", "3"]
-
-
 def test_arguments_are_evaluated_in_text_order():
     for call in ('f(b=g("first"), a=g("second"))', 'move(speed=g("first"), target=g("second"))'):
         robot = Robot(

@@ -3,7 +3,6 @@
 import asyncio
 
 import pytest
-from tests.system.conftest import called  # noqa: F401  a fixture
 
 from tvist_lab.collect import collect
 from tvist_lab.in_process import free_setup, robot_in_process, run_beside

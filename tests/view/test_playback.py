@@ -39,24 +39,6 @@ def test_command_writes_a_page(tmp_path):
     assert html.stat().st_size > 200_000
 
 
-@pytest.mark.parametrize(
-    ("arguments", "code", "says"),
-    [
-        (("--compare", "none"), 2, "compare has 1 shapers: give two or three"),
-        (("--compare", "none", "--compare", "nope"), 2, "nope"),
-        (("--magnify", "0.5"), 2, "magnify is 0.5: must be 1 to 300"),
-        (("--magnify", "nan"), 2, "magnify"),
-        (("missing.mcap",), 1, "missing.mcap"),
-        (("--html", "x.html"), 2, "needs a recording or --compare"),
-        (("--address", "0.0.0.0"), 1, "--insecure"),  # noqa: S104
-        (("--port", "70000"), 1, "port is 70000: must be 0 to 65535"),
-    ],
-)
-def test_misuse_is_refused_in_one_line(called, arguments, code, says, monkeypatch):
-    monkeypatch.setattr("os.nice", lambda _: None)  # the priority is that of the tests
-    called("view", *arguments).assert_failed(code, says)
-
-
 def test_recording_of_an_older_server_is_drawn_by_its_robot_file(tmp_path):
     ended = finished("-m", "tvist_cli", "view", OLD, "--html", tmp_path / "x.html")
     assert ended.returncode == 0, ended.stderr
