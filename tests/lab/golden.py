@@ -17,7 +17,7 @@ def golden(kind):
 
 
 INFO, STATE, TRUTH, IO = map(golden, (Info, State, Truth, Io))
-START = {"seed": 3, "q": [0.1 + 0.2, -0.0, 5e-324, 1e300]}
+START = {"seed": 3, "q": [0.1 + 0.2, -0.0, 5e-324, 1e300], "nested": {"b": 1, "a": None}}
 HARD_FLOATS = [5e-324, -0.0, 0.1 + 0.2, 1e300, -1e-300, 2.0**53 + 2]
 
 

@@ -5,7 +5,7 @@ import threading
 
 import msgspec
 import pytest
-from tests.server.test_recording_writer import INFO, STATE, TRUTH
+from tests.lab.golden import INFO, STATE, TRUTH
 
 from tvist_lab.recordings.mcap_file import read
 from tvist_protocol import Event, Setpoint

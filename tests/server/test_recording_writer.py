@@ -7,15 +7,13 @@ import jsonschema
 import msgspec
 import pytest
 from mcap.reader import make_reader
-from tests.lab.golden import INFO, STATE, TRUTH
+from tests.lab.golden import INFO, START, STATE, TRUTH, record
 
 from tvist_protocol import Event, Info, MoveJ, Setpoint
 from tvist_protocol.journal import Entry, entry_of
-from tvist_protocol.recorded import topics
-from tvist_server.recording.writer import RecordingWriter, heading
+from tvist_server.recording.writer import heading
 
 KINDS = ("state", "event", "truth", "io", "journal")
-START = {"seed": 3, "q": [0.1 + 0.2, -0.0], "nested": {"b": 1, "a": None}}
 
 
 def session(ticks):
@@ -36,13 +34,8 @@ def session(ticks):
 
 
 @pytest.fixture(scope="module")
-def recording():
-    stream = io.BytesIO()
-    writer = RecordingWriter(stream, topics(INFO.name), heading(INFO, START))
-    for message in session(400):
-        writer.write(message)
-    writer.finish({})
-    return stream.getvalue()
+def recording(tmp_path_factory):
+    return record(tmp_path_factory.mktemp("recording") / "run.mcap", session(400)).read_bytes()
 
 
 def test_the_plain_mcap_reader_opens_a_recording(recording):

@@ -5,13 +5,13 @@ import os
 
 import msgspec
 import pytest
-from tests.server.test_recording_writer import INFO, STATE, TRUTH, golden
+from tests.lab.golden import INFO, IO, STATE, TRUTH
 
 from tvist_lab.recordings import RecordingError
 from tvist_lab.recordings import read as read_log
 from tvist_lab.recordings.mcap_file import read
 from tvist_lab.replay import ReplayError, replay_file
-from tvist_protocol import Event, Io, State
+from tvist_protocol import Event, State
 from tvist_protocol.journal import Entry
 from tvist_protocol.recorded import segment_name, segment_of, topics
 from tvist_server.recording import RecorderError, writer
@@ -20,7 +20,6 @@ from tvist_server.recording.segments import Segments
 from tvist_server.recording.writer import heading
 
 KEEP = 100
-IO = golden("io", Io)
 
 
 def messages(ticks):
