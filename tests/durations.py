@@ -88,8 +88,9 @@ class Durations:
             self.clocked += report.duration
 
     def pytest_sessionfinish(self):
+        today = datetime.now(UTC)  # noqa: TID251  a date is meant
         machine = {
-            "date": f"{datetime.now(UTC):%Y-%m-%d}", "cpus": os.cpu_count(), "machine": platform.machine(),  # noqa: TID251  a date is meant
+            "date": f"{today:%Y-%m-%d}", "cpus": os.cpu_count(), "machine": platform.machine(),
             "python": platform.python_version(), "clocked": round(self.clocked, 1),
         }  # fmt: skip
         lines = (

@@ -24,8 +24,9 @@ def note(client: str, version: str, outcomes: Mapping[str, str], why: Mapping[st
     failed = {name: came for name, came in outcomes.items() if came != PASSED}
     others = {name: f"{came}: {why[name]}" if name in why else came for name, came in failed.items()}
     results = json.loads(RESULTS.read_text()) if RESULTS.exists() else {}
+    today = datetime.now(UTC)  # noqa: TID251  a date is meant
     results[client] = {
-        "version": version, "date": f"{datetime.now(UTC):%Y-%m-%d}", "tvist": git.stdout.strip(),  # noqa: TID251  a date is meant
+        "version": version, "date": f"{today:%Y-%m-%d}", "tvist": git.stdout.strip(),
         "passed": [name for name in outcomes if name not in others], "others": others,
     }  # fmt: skip
     RESULTS.write_text(json.dumps(results, indent=1, sort_keys=True) + "\n")

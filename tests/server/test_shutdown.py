@@ -12,7 +12,7 @@ import atexit, signal, threading, time
 from tvist_server import shutdown as module
 def on_and_on():
     while True: {what}
-module.LONGEST = 1.0
+module.LONGEST = 0.5
 shutdown = module.Shutdown()
 {where}
 """
