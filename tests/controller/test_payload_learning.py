@@ -44,7 +44,7 @@ Q1, Q2 = ROBOT.poses["Q1"], ROBOT.poses["Q2"]
 
 class Served:
     def __init__(self, study=None, **changes):
-        setup = free_setup(None, shaper="elastic")
+        setup = free_setup(shaper="elastic")
         self.setup = replace(setup, description=setup.description.clean(), **changes)
         self.host = LoopbackHost(self.setup, learning=study and PayloadLearning(study))
         self.states, self.events = [], []
