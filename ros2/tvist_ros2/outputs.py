@@ -42,7 +42,7 @@ class Outputs:
     def now(self) -> Any:
         """Return ROS time: that of the wall clock in real time, otherwise that of the latest state."""
         if self._clock is None:
-            return _stamp(time.time_ns())  # noqa: TID251  a date is meant
+            return _stamp(time.time_ns())  # noqa: TID251  ROS time
         return _stamp(0 if self.latest is None else round(1e9 * self.latest.timestamp))
 
     @property

@@ -151,4 +151,4 @@ def _attached(query: zenoh.Query) -> tuple[int, bytes]:
 
 
 def _attachment(number: int, identifier: bytes) -> bytes:
-    return ATTACHMENT.pack(number, time.time_ns(), len(identifier), identifier)  # noqa: TID251  a date is meant
+    return ATTACHMENT.pack(number, time.time_ns(), len(identifier), identifier)  # noqa: TID251  ROS time

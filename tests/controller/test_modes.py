@@ -50,8 +50,7 @@ def at(activity: Activity, **changes) -> Robot:
     elif activity is Activity.PROTECTIVE_STOP:
         robot.send(SimulationInject, fault="protective_stop")
     elif activity is not Activity.REST:
-        robot.send(c.MoveJ, q=Q3_)
-        robot.tick(120)
+        robot.move(120)
         ends = {
             Activity.PAUSED: (c.Pause, {}),
             Activity.STOPPING: (c.Stop, {}),

@@ -24,8 +24,7 @@ def inject(robot, fault, **fields):
 
 def moving(ticks=300):
     robot = Robot()
-    assert isinstance(robot.send(c.MoveJ, **MOVE), Accepted)
-    robot.tick(ticks)
+    robot.move(ticks)
     return robot
 
 

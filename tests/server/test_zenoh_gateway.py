@@ -15,6 +15,7 @@ import zenoh
 from tests import forked
 from tests.conformance.session import plain_session as connect
 from tests.places import free_endpoint
+from tests.system.waiting import eventually
 
 from tvist_protocol.codec import MAX_BYTES
 from tvist_server.gateways.base import GatewayError
@@ -241,8 +242,7 @@ def test_a_stopped_reader_loses_states_but_no_events(gateway, endpoint):
     with forked.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as reader:
         assert reader.stdout.readline() == "ready\n"
         reader.send_signal(signal.SIGSTOP)
-        while psutil.Process(reader.pid).status() != psutil.STATUS_STOPPED:
-            time.sleep(0.002)
+        eventually(lambda: psutil.Process(reader.pid).status() == psutil.STATUS_STOPPED)
         for number in range(2000):
             gateway.publish("state", None, bytes(9000))
             if number % 10 == 0:

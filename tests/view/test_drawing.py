@@ -110,7 +110,7 @@ def flanges(tab, angles, bends, track=0):
 
 
 def test_drawn_flange_of_seven_joints_matches_pinocchio(tab):
-    """That of the arm that moves is compared with its truth."""
+    """The next test compares the flange of the moving arm with its true pose."""
     description = load(SEVEN)
     model = rigid_model(description, description.payload)
     data, q = model.createData(), np.random.default_rng(0).uniform(-3.0, 3.0, (50, 7))
