@@ -147,7 +147,8 @@ class Fleet(FleetSession):
         self._session.liveliness().declare_subscriber(alive, self._of_robots(self._on_token), history=True)
         self._session.declare_subscriber(telemetry, self._of_robots(self._on_telemetry))
         # The subscriber gets the tokens of all present robots before this query ends.
-        if await query_tokens(self._session, alive, ANSWER_S) is None:
+        _, complete = await query_tokens(self._session, alive, ANSWER_S)
+        if not complete:
             late = f"{self._endpoint} has not named all robots within {ANSWER_S:g} s"
             raise NotConnectedError(f"{late}: try again, or restart the router there")
 

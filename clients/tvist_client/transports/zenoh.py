@@ -248,19 +248,19 @@ async def _opened(endpoint: str, security: Folder | None, namespace: str) -> zen
 
 async def _robots(session: zenoh.Session) -> list[str]:
     """Return the names of the reachable robots, in natural order: ur5e-2 before ur5e-10."""
-    tokens = await query_tokens(session, keys.ANY_ALIVE, INFO_S) or ()
+    tokens, _ = await query_tokens(session, keys.ANY_ALIVE, INFO_S)
     return sorted((place[1] for key in tokens if (place := keys.place(key)) is not None), key=natural)
 
 
-async def query_tokens(session: zenoh.Session, selector: str, seconds: float) -> list[str] | None:
-    """Return the liveliness tokens that a key selects; None if the router has not told all of them in time."""
+async def query_tokens(session: zenoh.Session, selector: str, seconds: float) -> tuple[list[str], bool]:
+    """Return the liveliness tokens that a key selects, and whether the router has told all of them in time."""
     loop, ended = asyncio.get_running_loop(), asyncio.Event()
     replies = list[zenoh.Reply]()
     callback = Callback(replies.append, partial(wake, loop, ended.set), indirect=False)
     session.liveliness().get(selector, callback, timeout=seconds)
     await ended.wait()
     tokens = [str(reply.ok.key_expr) for reply in replies if reply.ok is not None]
-    return tokens if len(tokens) == len(replies) else None
+    return tokens, len(tokens) == len(replies)
 
 
 def natural(name: str) -> list[int | str]:
